@@ -1,0 +1,3 @@
+"""Talking, feeling faces driven by speech, learned from recordings of one performer."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,1 @@
+"""Judging any method on any corpus."""

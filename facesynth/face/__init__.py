@@ -1,0 +1,1 @@
+"""Faces to show motion on: rigs, deformation, pictures, files."""

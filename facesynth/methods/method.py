@@ -1,0 +1,130 @@
+"""What every method of the zoo is: an `nn.Module` that learns from a corpus and turns speech into motion."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import nn
+
+from facesynth import __version__
+from facesynth.atomic import atomic_path
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError, unknown
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+from facesynth.speech.speech import Speech
+
+FORMAT = 1
+"""Version of the model file; a file of another version is refused."""
+
+
+class Method(nn.Module):
+    """Base of all methods: config in, `fit`, `synthesize`, one safetensors file on disk.
+
+    A subclass takes its config as keyword arguments of `__init__`, keeps learned arrays in buffers
+    and everything else that it learned in `facts`, a dictionary that JSON can hold.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, **config: Any) -> None:
+        super().__init__()
+        self.config: dict[str, Any] = config
+        self.layout: Layout | None = None
+        self.fps: float = 0.0
+        self.emotions: tuple[str, ...] = ()
+        self.facts: dict[str, Any] = {}
+        self.provenance: dict[str, Any] = {}
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> Self:
+        """Make one from a dictionary whose keys are checked against the constructor's arguments."""
+        known = [p for p in inspect.signature(cls.__init__).parameters if p != "self"]
+        for key in config:
+            if key not in known:
+                raise unknown(f"{cls.name} setting", key, known)
+        return cls(**config)
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Learn from a corpus; returns self."""
+        raise NotImplementedError
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """Motion for new speech, as long as its phone track, at the rate the method learned."""
+        raise NotImplementedError
+
+    @property
+    def fitted_layout(self) -> Layout:
+        """The layout learned from; FacesynthError before `fit`."""
+        if self.layout is None:
+            raise FacesynthError(f"this {self.name} model is not trained; call fit(corpus) or load(path) first")
+        return self.layout
+
+    def learned_from(self, corpus: Corpus) -> None:
+        """Remember what every saved model states of its training data."""
+        self.layout, self.fps, self.emotions = corpus.layout, corpus.fps, corpus.emotions
+        self.provenance = corpus.provenance()
+
+    def save(self, path: str | Path) -> None:
+        """Write one safetensors file, atomically; config, layout and provenance are its metadata."""
+        header = {
+            "method": self.name,
+            "config": self.config,
+            "layout": self.fitted_layout.to_dict(),
+            "fps": self.fps,
+            "emotions": list(self.emotions),
+            "facts": self.facts,
+            "provenance": self.provenance,
+            "facesynth": __version__,
+            "format": FORMAT,
+        }
+        tensors = {key: value.detach().cpu().contiguous() for key, value in self.state_dict().items()}
+        with atomic_path(path) as part:
+            save_file(tensors, part, metadata={"facesynth": json.dumps(header, sort_keys=True)})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote; a truncated, foreign or other-version file is a FacesynthError."""
+        header = read_header(path)
+        if header["method"] != cls.name:
+            raise FacesynthError(f"{path} holds a model of method {header['method']!r}, not {cls.name!r}")
+        method = cls.from_config(header["config"])
+        method.layout = Layout.from_dict(header["layout"])
+        method.fps, method.emotions = float(header["fps"]), tuple(header["emotions"])
+        method.facts, method.provenance = header["facts"], header["provenance"]
+        with safe_open(path, "pt") as file:
+            for key in file.keys():  # noqa: SIM118 - safe_open is no mapping
+                owner, _, leaf = key.rpartition(".")
+                _set_buffer(method.get_submodule(owner), leaf, file.get_tensor(key))
+        return method.eval()
+
+
+def read_header(path: str | Path) -> dict[str, Any]:
+    """The metadata of a model file; FacesynthError says what is wrong with a file that has none."""
+    if not Path(path).is_file():
+        raise FacesynthError(f"{path}: no such model file; train one with `facesynth train`")
+    try:
+        with safe_open(path, "pt") as file:
+            text = (file.metadata() or {}).get("facesynth")
+    except (SafetensorError, OSError) as error:
+        raise FacesynthError(f"{path} is not a facesynth model, or is truncated ({error})") from None
+    if text is None:
+        raise FacesynthError(f"{path} is a safetensors file without a facesynth header; it was not written by facesynth")
+    header: dict[str, Any] = json.loads(text)
+    if header.get("format") != FORMAT:
+        raise FacesynthError(f"{path} has model format {header.get('format')}; this facesynth reads {FORMAT}: train it again")
+    return header
+
+
+def _set_buffer(module: nn.Module, name: str, value: torch.Tensor) -> None:
+    if name in module._parameters:
+        module._parameters[name] = nn.Parameter(value, requires_grad=False)
+    else:
+        module.register_buffer(name, value)

@@ -1,0 +1,1 @@
+"""Facial movement and its mathematics, free of any method."""

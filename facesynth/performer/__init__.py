@@ -1,0 +1,1 @@
+"""The built-in performer: a synthetic actor, so that everything runs with nothing recorded."""
