@@ -1,0 +1,116 @@
+"""Sound from files: any format, rate and number of channels in, one mono signal out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import gcd
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.atomic import atomic_path
+from facesynth.errors import FacesynthError
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+
+SHORTEST_S = 0.05
+"""Less sound than this holds no phone."""
+SILENT_DB = -60.0
+"""Level of the loudest 50 ms, in dB of full scale, below which a sound counts as silence."""
+
+
+def load_audio(path: str | Path) -> tuple[NDArray[np.float32], int]:
+    """Read the sound of an audio or video file: mono samples [S] (mean of the channels, -1..1) and their rate in Hz.
+
+    A FacesynthError says whether there is no such file, no sound in it, no sample, or whether it cannot be read.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FacesynthError(f"{path}: no such file; give a sound or video file")
+    if path.stat().st_size == 0:
+        raise FacesynthError(f"{path} is empty (0 bytes); export the sound again")
+    channels, rate = _read_plain(path) or _read_container(path)
+    if channels.shape[0] == 0:
+        raise FacesynthError(f"{path} holds 0 samples of sound; record it again")
+    audio = channels.mean(axis=1, dtype=np.float64).astype(np.float32)
+    if not np.isfinite(audio).all():
+        raise FacesynthError(f"{path} holds NaN or infinite samples; export the sound again")
+    return audio, rate
+
+
+def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np.float32]:
+    """The same sound [S] at another rate in Hz, band-limited (polyphase filter)."""
+    from scipy.signal import resample_poly
+
+    if rate == new_rate:
+        return np.asarray(audio, np.float32)
+    common = gcd(rate, new_rate)
+    return resample_poly(np.asarray(audio, np.float64), new_rate // common, rate // common).astype(np.float32)
+
+
+def save_wav(path: str | Path, audio: NDArray[np.float32], rate: int) -> None:
+    """Write mono sound [S], -1..1, as 16-bit WAV; louder samples are clipped. The file appears whole or not at all."""
+    import soundfile
+
+    with atomic_path(path) as part:
+        soundfile.write(part, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
+
+
+def require_sound(audio: NDArray[np.float32], rate: int) -> None:
+    """FacesynthError where a sound [S] is too short to hold speech, or silent."""
+    duration_s = len(audio) / rate
+    if duration_s < SHORTEST_S:
+        raise FacesynthError(f"the sound is {duration_s * 1000:.0f} ms long; at least {SHORTEST_S * 1000:.0f} ms are needed")
+    level_db = loudest_db(audio, rate)
+    if level_db < SILENT_DB:
+        raise FacesynthError(
+            f"the sound is silent: its loudest 50 ms are at {level_db:.0f} dB of full scale,"
+            f" speech lies above {SILENT_DB:.0f} dB; check the microphone or the channel"
+        )
+
+
+def loudest_db(audio: NDArray[np.float32], rate: int) -> float:
+    """RMS of the loudest 50 ms block around its own mean, dB of full scale; -inf for digital silence."""
+    block = max(1, round(SHORTEST_S * rate))
+    whole = np.asarray(audio[: len(audio) // block * block], np.float64).reshape(-1, block)
+    loudest = float(whole.std(axis=1).max())
+    return float(20 * np.log10(loudest)) if loudest > 0 else -np.inf
+
+
+def _read_plain(path: Path) -> tuple[NDArray[np.float32], int] | None:
+    """[S, channels] through libsndfile, or None for a file that it does not know."""
+    import soundfile
+
+    try:
+        with open(path, "rb") as file:
+            samples, rate = soundfile.read(file, dtype="float32", always_2d=True)
+    except (soundfile.LibsndfileError, RuntimeError):
+        return None
+    return samples, int(rate)
+
+
+def _read_container(path: Path) -> tuple[NDArray[np.float32], int]:
+    """[S, channels] of the first sound stream of anything that FFmpeg opens."""
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.audio:
+                raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
+            rate = int(container.streams.audio[0].rate)
+            blocks = list(_decoded(container, rate))
+    except av.FFmpegError as error:
+        raise FacesynthError(f"{path} cannot be read as sound or video ({error.strerror}); is it damaged?") from None
+    return (np.concatenate(blocks) if blocks else np.zeros((0, 1), np.float32)), rate
+
+
+def _decoded(container: InputContainer, rate: int) -> Iterator[NDArray[np.float32]]:
+    import av
+
+    resampler = av.AudioResampler(format="fltp", rate=rate)
+    for frame in container.decode(audio=0):
+        yield from (block.to_ndarray().T.astype(np.float32) for block in resampler.resample(frame))
+    yield from (block.to_ndarray().T.astype(np.float32) for block in resampler.resample(None))

@@ -1,0 +1,75 @@
+"""From labelled stretches of time, as files and aligners give them, to a phone track without gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from facesynth.errors import FacesynthError
+from facesynth.speech.phones import CLOSURES, SILENCE, normalise_phone
+from facesynth.speech.speech import PhoneTrack
+
+Segment = tuple[str, float, float]
+"""Label, start and end in seconds."""
+
+TOUCHING_S = 1e-6
+"""Ends and starts nearer than this are one boundary."""
+
+
+def phone_track(segments: Iterable[Segment], duration_s: float | None = None) -> PhoneTrack:
+    """The phones of labelled segments in order of time, any usual labels; gaps and the rest up to `duration_s` are silence.
+
+    A stop's closure joins its release (`bcl b` is one b), neighbouring silences become one.
+    FacesynthError where segments overlap, run backwards or bear an unknown label.
+    """
+    whole = list(_filled(segments, duration_s))
+    raw = [label.strip().lower() for label, _ in whole]
+    labels: list[str] = []
+    ends_s: list[float] = []
+    for number, (label, end_s) in enumerate(whole):
+        phone = normalise_phone(label)
+        if labels and (phone == labels[-1] == SILENCE or _is_release(raw[number - 1], phone)):
+            labels[-1], ends_s[-1] = phone, end_s
+        else:
+            labels.append(phone)
+            ends_s.append(end_s)
+    if not labels:
+        raise FacesynthError("there is not one phone; at least one is needed")
+    return PhoneTrack(tuple(labels), np.array(ends_s))
+
+
+def segments_of(track: PhoneTrack) -> list[Segment]:
+    """Label, start and end of each phone, seconds."""
+    return list(zip(track.labels, track.starts_s.tolist(), track.ends_s.tolist(), strict=True))
+
+
+def covering(track: PhoneTrack, duration_s: float) -> PhoneTrack:
+    """The track made as long as the sound: cut at `duration_s`, or completed with silence."""
+    kept = [(label, start, min(end, duration_s)) for label, start, end in segments_of(track) if start < duration_s - TOUCHING_S]
+    if kept and duration_s - kept[-1][2] < TOUCHING_S:
+        kept[-1] = (*kept[-1][:2], duration_s)
+    return phone_track(kept, duration_s)
+
+
+def _filled(segments: Iterable[Segment], duration_s: float | None) -> Iterable[tuple[str, float]]:
+    """Label and end of each segment, with silence wherever time is left over."""
+    now_s = 0.0
+    for number, (label, start_s, end_s) in enumerate(segments, start=1):
+        if not (np.isfinite([start_s, end_s]).all() and start_s >= now_s - TOUCHING_S and end_s > max(start_s, now_s)):
+            raise FacesynthError(
+                f"segment {number} ({label!r}) lies at {start_s:g} to {end_s:g} s, the one before ends at {now_s:g} s;"
+                " segments must follow one another and have a length"
+            )
+        if start_s > now_s + TOUCHING_S:
+            yield SILENCE, start_s
+        yield label, end_s
+        now_s = end_s
+    if duration_s is not None and duration_s > now_s + TOUCHING_S:
+        yield SILENCE, duration_s
+
+
+def _is_release(label_before: str, phone: str) -> bool:
+    """Whether `phone` is what opens the closure before it; affricates open a closure of t or d."""
+    stop = CLOSURES.get(label_before)
+    return stop is not None and (phone == stop or (stop, phone) in {("t", "ch"), ("d", "jh")})

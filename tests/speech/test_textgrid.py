@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facesynth.errors import FacesynthError
+from facesynth.speech.phones import PHONES
+from facesynth.speech.segments import covering, phone_track
+from facesynth.speech.speech import PhoneTrack
+from facesynth.speech.textgrid import read_label_lines, read_textgrid, write_label_lines, write_textgrid
+
+TRACK = PhoneTrack(("pau", "hh", "ah", "l", "ow", "pau"), np.array([0.1, 0.2, 1 / 3, 0.4, 0.55, 0.9]))
+WORDS = (("hello", 0.1, 0.55),)
+
+
+def test_textgrid_round_trip_in_a_path_with_spaces_and_umlauts(tmp_path):
+    path = tmp_path / "Größe zwei" / "süß – 音.TextGrid"
+    write_textgrid(path, TRACK, WORDS)
+    phones, words = read_textgrid(path)
+    assert phones.labels == TRACK.labels
+    np.testing.assert_allclose(phones.ends_s, TRACK.ends_s, atol=1e-6)
+    assert words[0][0] == "hello"
+    np.testing.assert_allclose(words[0][1:], WORDS[0][1:], atol=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(PHONES), st.floats(1e-3, 2)), min_size=1, max_size=40))
+def test_any_track_round_trips(tmp_path_factory, phones):
+    labels, lengths = zip(*(p for i, p in enumerate(phones) if not (i and p[0] == phones[i - 1][0] == "pau")), strict=True)
+    track = PhoneTrack(labels, np.cumsum(lengths))
+    folder = tmp_path_factory.mktemp("grid")
+    write_textgrid(folder / "a.TextGrid", track)
+    write_label_lines(folder / "a.lab", track)
+    for got in (read_textgrid(folder / "a.TextGrid")[0], read_label_lines(folder / "a.lab")):
+        assert got.labels == track.labels
+        np.testing.assert_allclose(got.ends_s, track.ends_s, atol=1e-6)
+
+
+def test_words_with_quotes_and_accents(tmp_path):
+    words = (('say "ah"', 0.1, 0.2), ("naïve", 0.2, 0.5))
+    write_textgrid(tmp_path / "a.TextGrid", TRACK, words)
+    assert [word for word, *_ in read_textgrid(tmp_path / "a.TextGrid")[1]] == ['say "ah"', "naïve"]
+
+
+def grid_text(tiers, end=1.0):
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", f"0\n{end}\n<exists>\n{len(tiers)}"]
+    for name, entries in tiers.items():
+        lines.append(f'"IntervalTier"\n"{name}"\n0\n{end}\n{len(entries)}')
+        lines += [f'{start}\n{stop}\n"{label}"' for label, start, stop in entries]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_another_aligners_tiers_with_gaps(tmp_path, encoding):
+    tiers = {"Mary - words": [("sp", 0, 0.2), ("hi", 0.2, 0.6)], "Mary - phones": [("HH", 0.2, 0.4), ("AY1", 0.4, 0.6)]}
+    (tmp_path / "a.TextGrid").write_text(grid_text(tiers), encoding=encoding)
+    phones, words = read_textgrid(tmp_path / "a.TextGrid")
+    assert phones.labels == ("pau", "hh", "ay", "pau")
+    np.testing.assert_allclose(phones.ends_s, [0.2, 0.4, 0.6, 1.0])
+    assert words == (("hi", 0.2, 0.6),)
+
+
+def test_textgrids_that_cannot_be_used(tmp_path):
+    path = tmp_path / "a.TextGrid"
+    with pytest.raises(FacesynthError, match="no such TextGrid"):
+        read_textgrid(path)
+    for text in ("hello\n", "", grid_text({"phones": [("AH", 0, 1)]})[:60]):
+        path.write_text(text)
+        with pytest.raises(FacesynthError, match=r"not a TextGrid|no tier"):
+            read_textgrid(path)
+    path.write_bytes(np.random.default_rng(1).bytes(500))
+    with pytest.raises(FacesynthError, match=r"not a TextGrid|no tier"):
+        read_textgrid(path)
+    path.write_text(grid_text({"tones": [("H", 0, 1)]}))
+    with pytest.raises(FacesynthError, match=r"no tier.*tones"):
+        read_textgrid(path)
+    path.write_text(grid_text({"phones": [("blah", 0, 1)]}))
+    with pytest.raises(FacesynthError, match=r"a.TextGrid: unknown phone 'blah'"):
+        read_textgrid(path)
+
+
+def test_label_lines_of_both_kinds(tmp_path):
+    (tmp_path / "a.lab").write_text("# Deng's form\n0.25 sil\n\n0.5 B\r\n1.0 AA1\n")
+    track = read_label_lines(tmp_path / "a.lab")
+    assert track.labels == ("pau", "b", "aa")
+    np.testing.assert_allclose(track.ends_s, [0.25, 0.5, 1.0])
+    (tmp_path / "b.lab").write_text("0.1 0.3 b\n0.5 0.6 aa\n")
+    track = read_label_lines(tmp_path / "b.lab")
+    assert track.labels == ("pau", "b", "pau", "aa")
+    np.testing.assert_allclose(track.ends_s, [0.1, 0.3, 0.5, 0.6])
+
+
+@pytest.mark.parametrize("text", ["0.5 b\n0.4 aa\n", "0.5 b\nx aa\n", "0.5\n", "1 2 3 b\n", "0.5 b\nnan aa\n", "0.5 b\n0.5 aa\n"])
+def test_bad_label_lines_are_named(tmp_path, text):
+    (tmp_path / "a.lab").write_text(text)
+    with pytest.raises(FacesynthError, match=r"line \d"):
+        read_label_lines(tmp_path / "a.lab")
+
+
+def test_label_files_that_are_none(tmp_path):
+    with pytest.raises(FacesynthError, match="no such file"):
+        read_label_lines(tmp_path / "a.lab")
+    (tmp_path / "a.lab").write_text("")
+    with pytest.raises(FacesynthError, match="not one phone"):
+        read_label_lines(tmp_path / "a.lab")
+    (tmp_path / "a.lab").write_bytes(b"\xff\xfe\x00\xd8")
+    with pytest.raises(FacesynthError, match="UTF-8"):
+        read_label_lines(tmp_path / "a.lab")
+
+
+def test_closures_join_their_release():
+    track = phone_track(
+        [("bcl", 0, 0.1), ("b", 0.1, 0.2), ("tcl", 0.2, 0.3), ("ch", 0.3, 0.4), ("kcl", 0.4, 0.5), ("ae", 0.5, 0.6)]
+    )
+    assert track.labels == ("b", "ch", "k", "ae")
+    assert track.ends_s.tolist() == [0.2, 0.4, 0.5, 0.6]
+
+
+def test_covering_cuts_or_completes():
+    assert covering(TRACK, 2.0).duration_s == 2.0
+    assert covering(TRACK, 2.0).labels == TRACK.labels
+    assert covering(TRACK, 0.3).labels == ("pau", "hh", "ah")
+    assert covering(TRACK, 0.3).duration_s == 0.3
+    spoken = PhoneTrack(("aa",), np.array([0.5]))
+    assert covering(spoken, 0.8).labels == ("aa", "pau")
+    assert covering(spoken, 0.5 + 1e-9).ends_s.tolist() == [0.5 + 1e-9]
+
+
+def test_overlapping_segments_are_refused():
+    with pytest.raises(FacesynthError, match="segment 2"):
+        phone_track([("aa", 0, 0.5), ("b", 0.3, 0.7)])
