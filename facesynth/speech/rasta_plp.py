@@ -47,7 +47,7 @@ class RastaPlp(nn.Module):
         if not 1 <= order < len(centres_bark) or self.hop < 1 or length < 2:
             raise FacesynthError(
                 f"RASTA-PLP at {sample_rate} Hz has {len(centres_bark)} critical bands, which allow an order of 1 to "
-                f"{len(centres_bark) - 1} and windows and hops of some samples; got order {order}, {length} and {self.hop} samples"
+                f"{len(centres_bark) - 1} and a window and a hop of some samples; got order {order}, {length} and {self.hop}"
             )
         self.register_buffer("window", torch.hamming_window(length, periodic=False, dtype=torch.float64), persistent=False)
         self.register_buffer("bands", torch.from_numpy(critical_bands(sample_rate, self.fft)), persistent=False)

@@ -26,7 +26,7 @@ def speechlike(seed, seconds=1.0):
     return (0.1 * (envelope * lfilter(*low, noise) + (1 - envelope) * lfilter(*high, noise))).astype(np.float32)
 
 
-def plainly(audio, rate=RATE, window_s=0.025, hop_s=0.010, order=8, lift=0.6):
+def plainly(audio, rate=RATE, *, window_s=0.025, hop_s=0.010, order=8, lift=0.6):
     """RASTA-PLP again, frame by frame and band by band, with the textbook tools for each step."""
     length, hop = round(window_s * rate), round(hop_s * rate)
     fft = 2 ** int(np.ceil(np.log2(length)))
@@ -71,7 +71,7 @@ def test_agrees_with_a_plainly_written_reference():
 def test_agrees_at_another_rate_window_hop_and_order():
     audio = speechlike(1, 0.3)
     features = RastaPlp(8000, window_s=0.032, hop_s=0.016, order=5)(torch.from_numpy(audio))
-    np.testing.assert_allclose(features, plainly(audio, 8000, 0.032, 0.016, 5), atol=2e-5)
+    np.testing.assert_allclose(features, plainly(audio, 8000, window_s=0.032, hop_s=0.016, order=5), atol=2e-5)
 
 
 def test_filter_passes_syllables_and_stops_channels():
