@@ -1,0 +1,78 @@
+"""The periodogram of the sound of each video frame: the input of the linear dynamical system."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import torch
+from torch import Tensor, nn
+
+from facesynth.errors import FacesynthError, unknown
+from facesynth.speech.speech import Speech
+
+Scale = Literal["linear", "log"]
+RATE = 16_000
+"""Hz, of the sound that is analysed."""
+COEFFICIENTS = 256
+"""Bins of 31.25 Hz, from 31.25 Hz to 8 kHz."""
+SHORTEST_WINDOW_S = 0.032
+FLOOR = 1e-7
+"""Power, relative to full scale, under which `log` sees silence: about the noise of a 12-bit recording."""
+
+
+class Periodogram(nn.Module):
+    """256 coefficients of the power spectrum for each video frame (Saisan 2004, §5).
+
+    Frame t shows what happens from t / fps to (t + 1) / fps. Its window, as long as that frame and at least 32 ms,
+    is centred on the middle of it, `lead_ms` later, since lips move before the sound is heard. The centre is
+    `round((t + 1/2) RATE / fps + lead)`, never a sum of rounded hops: the clocks stay together for any fps.
+    """
+
+    window: Tensor
+    """[L] Hann window of unit energy."""
+
+    def __init__(self, fps: float, scale: Scale = "log", lead_ms: float = 0.0) -> None:
+        super().__init__()
+        if not (math.isfinite(fps) and fps > 0):
+            raise FacesynthError(f"fps must be positive; got {fps}")
+        if scale not in get_args(Scale):
+            raise unknown("periodogram scale", scale, get_args(Scale))
+        self.fps, self.scale, self.lead_ms = fps, scale, lead_ms
+        length = round(RATE * max(1 / fps, SHORTEST_WINDOW_S))
+        window = torch.hann_window(length, dtype=torch.float64)
+        self.register_buffer("window", (window / window.square().sum().sqrt()).float())
+        self.bins_each = math.ceil(length / (2 * COEFFICIENTS))
+
+    def centres(self, count: int) -> Tensor:
+        """[count] sample at the middle of each frame's window, counted at 16 kHz."""
+        times_s = (torch.arange(count, dtype=torch.float64) + 0.5) / self.fps + self.lead_ms / 1000
+        return torch.round(times_s * RATE).long()
+
+    def forward(self, audio: Tensor, count: int) -> Tensor:
+        """Coefficients [count, 256] of sound [S] at 16 kHz, which is silent before its start and after its end.
+
+        Windows longer than 32 ms resolve more than 256 bins; neighbours are averaged down to 256.
+        """
+        length = len(self.window)
+        starts = self.centres(count).to(audio.device) - length // 2
+        before = int((-starts[0]).clamp(min=0))
+        after = int((starts[-1] + length - len(audio)).clamp(min=0))
+        frames = nn.functional.pad(audio, (before, after))[(starts + before)[:, None] + torch.arange(length, device=audio.device)]
+        power = torch.fft.rfft(frames * self.window, n=2 * COEFFICIENTS * self.bins_each).abs().square()
+        power = power[:, 1 : 1 + COEFFICIENTS * self.bins_each].reshape(count, COEFFICIENTS, self.bins_each).mean(dim=2)
+        return power if self.scale == "linear" else torch.log(power + FLOOR)
+
+    def of(self, speech: Speech, count: int) -> Tensor:
+        """Coefficients [count, 256] of an utterance at any sampling rate."""
+        return self(resampled(torch.from_numpy(speech.audio), speech.sample_rate), count)
+
+
+def resampled(audio: Tensor, sample_rate: int) -> Tensor:
+    """Sound [S] at 16 kHz, through a polyphase low-pass filter."""
+    from scipy.signal import resample_poly
+
+    if sample_rate == RATE:
+        return audio
+    shared = math.gcd(RATE, sample_rate)
+    return torch.from_numpy(resample_poly(audio.numpy(), RATE // shared, sample_rate // shared))
