@@ -1,0 +1,87 @@
+"""corpus.yaml: what holds for every utterance of a corpus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from facesynth.atomic import write_text
+from facesynth.errors import FacesynthError
+from facesynth.motion.layout import Layout
+
+FORMAT = 1
+"""Version of the folder's format; a corpus of another version is refused."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """What holds for every utterance of a corpus."""
+
+    performer: str
+    layout: Layout
+    fps: float
+    """Rate of the motion, Hz."""
+    emotions: tuple[str, ...]
+    synthetic: bool = False
+    """Whether nobody was recorded: voice and face are computed."""
+    licence: str = ""
+    """Of recordings that state none of their own."""
+    consent: str = ""
+    notes: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "emotions", tuple(self.emotions))
+        if not self.performer.strip():
+            raise FacesynthError("a corpus needs the performer's name; got an empty one")
+        if not (1 <= self.fps <= 1000):
+            raise FacesynthError(f"fps must lie between 1 and 1000; got {self.fps}")
+        if not self.emotions or len(set(self.emotions)) != len(self.emotions) or not all(self.emotions):
+            raise FacesynthError(f"a corpus needs a list of different emotions, at least one; got {list(self.emotions)}")
+
+
+def read_header(path: Path) -> Header:
+    """Read corpus.yaml; FacesynthError for a folder that is no corpus, or one of another version."""
+    if not path.is_file():
+        raise FacesynthError(f"{path.parent} is no corpus (it has no corpus.yaml); make one with `facesynth corpus new`")
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise FacesynthError(f"{path} is not readable as YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(plain, dict) or plain.get("format") != FORMAT:
+        got = plain.get("format") if isinstance(plain, dict) else None
+        raise FacesynthError(f"{path} states corpus format {got}; this facesynth reads format {FORMAT}")
+    try:
+        return _header(plain)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else error
+        raise FacesynthError(f"{path}: {what}") from None
+
+
+def write_header(path: Path, header: Header) -> None:
+    """Write corpus.yaml, atomically."""
+    plain = {
+        "format": FORMAT,
+        "performer": header.performer,
+        "synthetic": header.synthetic,
+        "fps": header.fps,
+        "emotions": list(header.emotions),
+        "licence": header.licence,
+        "consent": header.consent,
+        "notes": header.notes,
+        "layout": header.layout.to_dict(),
+    }
+    write_text(path, yaml.safe_dump(plain, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))
+
+
+def _header(plain: dict[str, Any]) -> Header:
+    return Header(
+        performer=str(plain["performer"]),
+        layout=Layout.from_dict(plain["layout"]),
+        fps=float(plain["fps"]),
+        emotions=tuple(map(str, plain["emotions"])),
+        synthetic=bool(plain.get("synthetic", False)),
+        **{name: str(plain.get(name) or "") for name in ("licence", "consent", "notes")},
+    )

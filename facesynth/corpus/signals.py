@@ -1,0 +1,133 @@
+"""Sound, phones, emotions and motion of one utterance: from its files and into them."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.atomic import atomic_path
+from facesynth.corpus.files import Files
+from facesynth.corpus.header import Header
+from facesynth.corpus.record import Record
+from facesynth.corpus.utterance import Utterance
+from facesynth.errors import FacesynthError
+from facesynth.motion.gaps import LONGEST_S, GapReport, fill_gaps
+from facesynth.motion.motion import Motion
+from facesynth.motion.pose import fill_head
+from facesynth.speech.audio import load_audio, save_wav
+from facesynth.speech.segments import Segment
+from facesynth.speech.speech import EmotionTrack, Speech
+from facesynth.speech.textgrid import read_textgrid, write_textgrid
+
+
+def write_signals(files: Files, record: Record, speech: Speech, motion: Motion, words: Sequence[Segment]) -> None:
+    """Write every file of an utterance, each atomically."""
+    save_wav(files.audio(record.id), speech.audio, speech.sample_rate)
+    write_textgrid(files.phones(record.id), speech.phones, words)
+    _write_emotions(files.emotions(record.id), record, speech.emotions)
+    write_motion(files.motion(record.id), motion)
+
+
+def read_utterance(files: Files, header: Header, record: Record) -> tuple[Utterance, GapReport]:
+    """An utterance from its files, short gaps filled, with the account of its gaps."""
+    speech = read_speech(files, record)
+    raw = read_motion(files.motion(record.id), header)
+    filled, report = fill_gaps(raw.frames, raw.fps, raw.layout.dimension)
+    frames = int(speech.phones.frame_bounds(raw.fps)[-1])
+    motion = Motion(
+        fit_length(filled, frames, raw.fps),
+        raw.fps,
+        raw.layout,
+        None if raw.head is None else fit_length(fill_head(raw.head, raw.fps), frames, raw.fps),
+        None if raw.eyes is None else fit_length(fill_gaps(raw.eyes, raw.fps, 3)[0], frames, raw.fps),
+    )
+    return Utterance(record.id, speech, motion, record.sentence_key, record.take, header.performer), report
+
+
+def read_speech(files: Files, record: Record) -> Speech:
+    """Sound, phones and emotions of an utterance."""
+    audio, rate = load_audio(files.audio(record.id))
+    phones, _ = read_textgrid(files.phones(record.id))
+    return Speech(audio, rate, phones, read_emotion_track(files, record, phones.duration_s), record.text)
+
+
+def read_emotion_track(files: Files, record: Record, duration_s: float) -> EmotionTrack:
+    """The utterance's emotions/ID.csv, or where there is none the emotion of its record."""
+    path = files.emotions(record.id)
+    if not path.exists():
+        return EmotionTrack.constant(record.emotion, duration_s, record.intensity)
+    from facesynth.speech.emotions import read_emotions
+
+    return read_emotions(path, duration_s)
+
+
+def read_motion(path: Path, header: Header) -> Motion:
+    """The motion as it was recorded, NaN where samples are missing; FacesynthError for what is no such file."""
+    if not path.is_file():
+        raise FacesynthError(f"{path} is missing; add the utterance again")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in ("frames", "head", "eyes", "fps") if name in file}
+    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+        raise FacesynthError(f"{path} is not a motion file, or is damaged ({error}); add the utterance again") from None
+    if "frames" not in arrays:
+        raise FacesynthError(f"{path} holds no array 'frames'; wanted frames [T, {header.layout.channels}]")
+    fps = float(arrays.get("fps", header.fps))
+    if not np.isclose(fps, header.fps, rtol=1e-6):
+        raise FacesynthError(f"{path} runs at {fps:g} fps, the corpus at {header.fps:g}; resample it and add it again")
+    try:
+        return Motion(arrays["frames"], header.fps, header.layout, arrays.get("head"), arrays.get("eyes"))
+    except ValueError as error:
+        raise FacesynthError(f"{path}: {error}") from None
+
+
+def write_motion(path: Path, motion: Motion) -> None:
+    """Write motion/ID.npz, atomically; the same motion gives the same bytes."""
+    arrays: dict[str, Any] = {"frames": motion.frames, "fps": np.float64(motion.fps)}
+    arrays |= {name: value for name, value in (("head", motion.head), ("eyes", motion.eyes)) if value is not None}
+    with atomic_path(path) as part, open(part, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def fit_length(signal: NDArray[np.float32], frames: int, fps: float) -> NDArray[np.float32]:
+    """Cut a signal [T, C] to `frames`, or lengthen it: the last frame is held for at most 0.1 s, then NaN follows.
+
+    A camera and a microphone seldom stop in the same frame; `check` names differences that are longer.
+    """
+    lacking = frames - len(signal)
+    if lacking <= 0 or not len(signal):
+        return signal[:frames]
+    held = min(lacking, int(LONGEST_S * fps))
+    tail = np.full((lacking, signal.shape[1]), np.nan, np.float32)
+    tail[:held] = signal[-1]
+    return np.concatenate([signal, tail])
+
+
+def hash_signals(speech: Speech, motion: Motion) -> str:
+    """sha256 of the sound and the motion of a recording, whatever is said of it."""
+    digest = hashlib.sha256(f"{speech.sample_rate} {motion.fps:.6f}".encode())
+    for array in (speech.audio, motion.frames, motion.head, motion.eyes):
+        digest.update(b"none" if array is None else str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def hash_file(path: Path) -> str:
+    """sha256 of a file's bytes."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _write_emotions(path: Path, record: Record, emotions: EmotionTrack) -> None:
+    """Write emotions/ID.csv where the record's one emotion does not say it all."""
+    if emotions.labels == (record.emotion,) and float(emotions.intensities[0]) == record.intensity:
+        path.unlink(missing_ok=True)
+    else:
+        from facesynth.speech.emotions import write_emotions
+
+        write_emotions(path, emotions)

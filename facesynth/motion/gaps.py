@@ -1,0 +1,84 @@
+"""Missing samples: which are filled, which stay missing, and an account of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+
+LONGEST_S = 0.1
+"""Longest gap that is filled, seconds: about the shortest movement that one could miss."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Frames `start` to `stop` (exclusive) in which one point is missing."""
+
+    point: int
+    start: int
+    stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+
+@dataclass(frozen=True)
+class GapReport:
+    """What `fill_gaps` did. A sample is one point in one frame."""
+
+    samples: int
+    """Samples there are: frames times points."""
+    filled_samples: int
+    """Samples that were missing and are filled."""
+    long_gaps: tuple[Gap, ...]
+    """Gaps left open: too long, or at the first or last frame."""
+
+    @property
+    def missing_samples(self) -> int:
+        """Samples that are still missing."""
+        return sum(len(gap) for gap in self.long_gaps)
+
+
+def fill_gaps(
+    frames: NDArray[np.float32], fps: float, dimension: int, longest_s: float = LONGEST_S
+) -> tuple[NDArray[np.float32], GapReport]:
+    """Fill short gaps by cubic interpolation in time; longer ones, and those at the edges, stay NaN.
+
+    frames: [T, K * dimension], NaN where a sample is missing. A point with one missing coordinate is missing.
+    Returns the filled copy [T, K * dimension] and the account.
+    """
+    if frames.ndim != 2 or frames.shape[1] % dimension:
+        raise FacesynthError(f"frames must have shape [T, K * {dimension}]; got {frames.shape}")
+    points = frames.reshape(len(frames), -1, dimension).copy()
+    missing = missing_in(points)
+    points[missing] = np.nan
+    longest = int(np.floor(longest_s * fps + 1e-6))
+    gaps = [gap for k in np.flatnonzero(missing.any(axis=0)) for gap in runs(missing[:, k], int(k))]
+    short = [gap for gap in gaps if gap.start > 0 and gap.stop < len(frames) and len(gap) <= longest]
+    for k in sorted({gap.point for gap in short}):
+        _interpolate(points[:, k], ~missing[:, k], [gap for gap in short if gap.point == k])
+    left = tuple(gap for gap in gaps if gap not in short)
+    return points.reshape(frames.shape), GapReport(missing.size, sum(map(len, short)), left)
+
+
+def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Where any value along the last axis is NaN: [..., n] → [...]."""
+    return np.asarray(np.isnan(values).any(axis=-1))
+
+
+def runs(missing: NDArray[np.bool_], point: int = 0) -> list[Gap]:
+    """The runs of True in a mask [T], in order."""
+    edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
+    return [Gap(point, int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+
+
+def _interpolate(track: NDArray[np.float32], present: NDArray[np.bool_], gaps: list[Gap]) -> None:
+    """Fill the gaps of one point's track [T, dimension] in place."""
+    from scipy.interpolate import CubicSpline
+
+    known = np.flatnonzero(present)
+    wanted = np.concatenate([np.arange(gap.start, gap.stop) for gap in gaps])
+    track[wanted] = CubicSpline(known, track[known].astype(np.float64))(wanted)
