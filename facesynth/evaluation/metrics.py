@@ -1,0 +1,82 @@
+"""The metrics by name: what each is measured in, which way is better, and the function that defines it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from facesynth.errors import unknown
+from facesynth.evaluation import dynamics, geometry, head, lips, timing
+from facesynth.motion.motion import Motion
+from facesynth.speech.speech import PhoneTrack
+
+
+@dataclass(frozen=True)
+class Case:
+    """One utterance to judge."""
+
+    synthesised: Motion
+    truth: Motion
+    phones: PhoneTrack
+    closure_threshold: float
+    """Opening that counts as shut, unit of the layout; NaN where the recordings have no p, b or m."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of an utterance."""
+
+    name: str
+    unit: str
+    """`u` stands for the unit of the layout: mm, px or weight."""
+    best: Literal["low", "high", "0", "1"]
+    """Which way is better, or the value that is best."""
+    measure: Callable[[Case], float]
+    """Raises UnavailableError where it has no value; its module's function of the same name is the definition."""
+
+    def unit_in(self, layout_unit: str) -> str:
+        """The unit with the layout's own in the place of `u`."""
+        return self.unit.replace("u", layout_unit) if self.unit.startswith("u") else self.unit
+
+
+def _of_pair(name: str, unit: str, best: Literal["low", "high", "0", "1"], function: Callable[[Motion, Motion], float]) -> Metric:
+    return Metric(name, unit, best, lambda case: function(case.synthesised, case.truth))
+
+
+METRICS: tuple[Metric, ...] = (
+    _of_pair("marker_error", "u", "low", geometry.marker_error),
+    _of_pair("marker_error_centred", "u", "low", geometry.marker_error_centred),
+    _of_pair("deng_error", "u²", "low", geometry.deng_error),
+    _of_pair("unit_cube_rms", "1", "low", geometry.unit_cube_rms),
+    _of_pair("lve", "u", "low", geometry.lve),
+    _of_pair("lve_sq", "u²", "low", geometry.lve_sq),
+    _of_pair("lve_centred", "u", "low", geometry.lve_centred),
+    _of_pair("fdd", "u", "0", dynamics.fdd),
+    _of_pair("fdd_abs", "u", "low", dynamics.fdd_abs),
+    _of_pair("velocity_error", "u/s", "low", dynamics.velocity_error),
+    _of_pair("lip_gap_corr", "1", "high", lips.lip_gap_corr),
+    _of_pair("lip_gap_ccc", "1", "high", lips.lip_gap_ccc),
+    Metric("closure_rate", "1", "high", lambda case: lips.closure_rate(case.synthesised, case.phones, case.closure_threshold)),
+    Metric(
+        "false_closure_rate",
+        "1",
+        "low",
+        lambda case: lips.false_closure_rate(case.synthesised, case.phones, case.closure_threshold),
+    ),
+    _of_pair("lip_lag", "ms", "0", timing.lip_lag),
+    _of_pair("lip_extrema_lag", "ms", "low", timing.lip_extrema_lag),
+    _of_pair("jerk_ratio", "1", "1", dynamics.jerk_ratio),
+    _of_pair("energy_ratio", "1", "1", dynamics.energy_ratio),
+    _of_pair("head_cca", "1", "high", head.head_cca),
+    _of_pair("head_distance", "deg", "low", head.head_distance),
+)
+"""What is measured for every utterance of every method, in the order of the tables."""
+
+
+def metric(name: str) -> Metric:
+    """The metric of this name; FacesynthError with the nearest names where there is none."""
+    for one in METRICS:
+        if one.name == name:
+            return one
+    raise unknown("metric", name, (one.name for one in METRICS))

@@ -1,0 +1,120 @@
+"""Whether the mouth moves when the recorded one did, not only as it did."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from facesynth.evaluation.lips import lip_opening
+from facesynth.evaluation.pair import Array, UnavailableError, require_alike
+from facesynth.motion.motion import Motion
+
+LONGEST_LAG_S = 0.25
+"""No larger shift between sound and lips is looked for, s."""
+PROMINENCE = 0.1
+"""An extremum stands out by this share of the range of the recorded opening; smaller ones are noise."""
+
+
+def lip_lag(synthesised: Motion, truth: Motion) -> float:
+    """Shift at which the lip opening correlates best with the truth's (ms), positive where it comes late.
+
+    Shifts up to 250 ms, but never more than half of the utterance; between frames by the parabola
+    through the best three correlations.
+    """
+    mine, yours = _openings(synthesised, truth)
+    longest = min(round(LONGEST_LAG_S * truth.fps), len(yours) // 2 - 1)
+    scores = np.array([_correlation_at(mine, yours, lag) for lag in range(-longest, longest + 1)])
+    best = int(scores.argmax())
+    if not scores[best] > 0:
+        raise UnavailableError("the synthesised mouth follows the recorded one at no shift")
+    return float(best + _parabola_top(scores, best) - longest) / truth.fps * 1000
+
+
+def lip_extrema_lag(synthesised: Motion, truth: Motion) -> float:
+    """Mean |dt| (ms) between the truth's opening and closing extremes and where they are in the synthesised opening.
+
+    Derivative DTW (Keogh and Pazzani 2001) of the two openings, each derivative divided by its standard
+    deviation, within 250 ms of the diagonal; each extremum of the truth lies at the mean time of the
+    synthesised frames matched with it.
+    """
+    mine, yours = _openings(synthesised, truth)
+    extrema = _extrema(yours)
+    if not extrema.size:
+        raise UnavailableError("the recorded mouth has no opening or closing that stands out")
+    slopes = [_slope(signal) for signal in (mine, yours)]
+    if not slopes[0].std() > 0:
+        raise UnavailableError("the synthesised mouth stands still")
+    radius = max(1, round(LONGEST_LAG_S * truth.fps))
+    path = _dtw_path(slopes[0] / slopes[0].std(), slopes[1] / slopes[1].std(), radius)
+    matched = [path[path[:, 1] == frame, 0].mean() - frame for frame in extrema]
+    return float(np.abs(matched).mean()) / truth.fps * 1000
+
+
+def _openings(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:
+    """[T] both openings, the truth's gaps in time bridged linearly so that time stays uniform."""
+    require_alike(synthesised, truth)
+    mine, yours = lip_opening(synthesised), lip_opening(truth)
+    present = np.flatnonzero(~np.isnan(yours))
+    if len(present) < 8 or not yours[present].std() > 0:
+        raise UnavailableError("the recorded mouth stands still or is missing")
+    return mine, np.interp(np.arange(len(yours)), present, yours[present])
+
+
+def _correlation_at(mine: Array, yours: Array, lag: int) -> float:
+    """Pearson correlation of mine[t + lag] with yours[t] over the frames that both have."""
+    late, early = (mine[lag:], yours[: len(yours) - lag]) if lag >= 0 else (mine[:lag], yours[-lag:])
+    spread = late.std() * early.std()
+    return float(((late - late.mean()) * (early - early.mean())).mean() / spread) if spread > 1e-12 else 0.0
+
+
+def _parabola_top(scores: Array, best: int) -> float:
+    if not 0 < best < len(scores) - 1:
+        return 0.0
+    before, at, after = scores[best - 1 : best + 2]
+    bend = before - 2 * at + after
+    return float(0.5 * (before - after) / bend) if bend < 0 else 0.0
+
+
+def _extrema(opening: Array) -> NDArray[np.int64]:
+    prominence = PROMINENCE * np.ptp(opening)
+    return np.sort(np.concatenate([find_peaks(sign * opening, prominence=prominence)[0] for sign in (1, -1)]))
+
+
+def _slope(signal: Array) -> Array:
+    """Keogh and Pazzani's estimate: the mean of the step in and half the step across; ends repeat."""
+    inner = ((signal[1:-1] - signal[:-2]) + (signal[2:] - signal[:-2]) / 2) / 2
+    return np.concatenate([inner[:1], inner, inner[-1:]])
+
+
+@numba.njit(cache=True)
+def _dtw_path(mine: Array, yours: Array, radius: int) -> NDArray[np.int64]:
+    """[P, 2] pairs of frames (mine, yours) of least summed squared difference, both monotone, |i - j| <= radius.
+
+    Own routine: each cell needs its left neighbour, which no array operation expresses, and no
+    dynamic time-warping package is worth a dependency for thirty lines. Only the band is kept:
+    cell (i, j), counted from 1, lies in column j - i + radius, so that (i-1, j-1) is in the same
+    column, (i-1, j) one to the right and (i, j-1) one to the left.
+    """
+    length, width = len(mine), 2 * radius + 1
+    cost = np.full((length + 1, width + 2), np.inf)  # one column of walls on either side
+    cost[0, radius + 1] = 0.0
+    for i in range(1, length + 1):
+        for k in range(max(1, radius + 2 - i), min(width, length - i + radius + 1) + 1):
+            j = i + k - radius - 1
+            before = min(cost[i - 1, k], cost[i - 1, k + 1], cost[i, k - 1])
+            cost[i, k] = (mine[i - 1] - yours[j - 1]) ** 2 + before
+    path = np.empty((2 * length, 2), np.int64)
+    count, i, k = 0, length, radius + 1
+    while i > 0:
+        path[count, 0], path[count, 1] = i - 1, i + k - radius - 2
+        count += 1
+        across, up, left = cost[i - 1, k], cost[i - 1, k + 1], cost[i, k - 1]
+        if across <= up and across <= left:
+            i -= 1
+        elif up <= left:
+            i, k = i - 1, k + 1
+        else:
+            k -= 1
+    return path[:count][::-1]
