@@ -1,0 +1,355 @@
+"""The cheapest path of motion nodes, exactly, without looking at most of the pairs.
+
+The recursion (Deng 2008, Algorithm 1) is
+
+    phi_1(j) = OC + EMP + B,    phi_t(j) = min_i [phi_t-1(i) + TC(i, j)] + OC + EMP + B
+
+and Θ(N²T) as written. Three facts make it fast without an approximation:
+
+* phi_t(j) is needed only for the nodes that the next step may build on. OC and EMP are the same for
+  all nodes of one (phone, emotion), and `min phi_t-1 + OC + EMP` bounds them all from below, so
+  whole classes stay unevaluated until some successor really asks for one of their nodes.
+* PVC is a squared Euclidean distance, so a ball tree over the end vectors, with the smallest phi of
+  each ball, finds the best predecessor of j without visiting the others.
+* DSC is never negative: it is computed for the few pairs that PVC alone does not rule out.
+
+Everything is float64. Bounds are compared with a rounding margin, ties go to the lowest node.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from facesynth.methods.efase.costs import Query, Weights, end_vectors, path_cost, start_vectors
+from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
+from facesynth.methods.efase.trees import Forest, grow_forest
+from facesynth.progress import track
+
+MARGIN = 1 + 1e-9
+"""Relative rounding margin of bounds."""
+
+
+class Tables(NamedTuple):
+    """What the search reads; rows are nodes in the forest's order, so that a ball is a range of rows."""
+
+    node: Ints
+    """[N] the node of each row."""
+    before: Ints
+    """[N] the row of pre(row), or -1."""
+    tree_of: Ints
+    ends: Floats
+    """[N, 2D] end vectors."""
+    joints: Floats
+    """[N, 2D] start vectors."""
+    frames: Floats
+    """[F, D] all frames, by row."""
+    starts: Ints
+    """[N + 1] first frame of each row."""
+    bends: Floats
+    """[F, D] second difference of `w p`, at the row's frames; the last two of each row are zero."""
+    ball_starts: Ints
+    ball_stops: Ints
+    left: Ints
+    right: Ints
+    centres: Floats
+    radii: Floats
+    roots: Ints
+    tree_visemes: Ints
+    """[C] viseme class of each tree."""
+    visemes: Ints
+    """[N] viseme class of each row."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchIndex:
+    """Everything that can be prepared before the input is known; its size grows with N."""
+
+    tables: Tables
+    tree_phones: Ints
+    tree_emotions: Ints
+    nodes: MotionNodes
+    weights: Weights
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the tables, which are all that is kept beyond the nodes themselves."""
+        return sum(table.nbytes for table in self.tables)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The optimum."""
+
+    nodes: Ints
+    """[T] a node for each phone."""
+    cost: float
+    evaluated: float
+    """Share of the (phone, node) pairs whose phi was computed."""
+
+
+def build_index(nodes: MotionNodes, weights: Weights) -> SearchIndex:
+    """Grow the forest and put everything in its order. O(N log N) time, O(N) memory."""
+    key = nodes.phones * (int(nodes.emotions.max()) + 1) + nodes.emotions
+    _, first, tree_of = np.unique(key, return_index=True, return_inverse=True)
+    ends = end_vectors(nodes, weights)
+    forest = grow_forest(ends, tree_of)
+    tables = _tables(nodes, weights, forest, ends, nodes.visemes[first])
+    return SearchIndex(tables, nodes.phones[first], nodes.emotions[first], nodes, weights)
+
+
+def search(index: SearchIndex, query: Query) -> Path:
+    """The path of least COST; ties go to the lowest node. Memory grows with T · N."""
+    tables, state = index.tables, _State.empty(len(query), index.tables)
+    targets = _tree_targets(index, query)
+    fixed = np.full(len(query), -1, np.int64)
+    row_of = np.argsort(tables.node)
+    for t, node in query.fixed.items():
+        fixed[t] = row_of[node]
+    scale = index.weights.beta, index.weights.pnt, index.weights.alpha
+    for t in track(range(len(query)), "searching"):
+        _advance(t, tables, state, targets, fixed, *scale)
+    rows = _backtrack(state, len(query))
+    path = tables.node[rows]
+    return Path(path, path_cost(index.nodes, query, path, index.weights), float(state.known.mean()))
+
+
+class _State(NamedTuple):
+    phi: Floats
+    """[T, N] where known."""
+    known: NDArray[np.uint8]
+    back: NDArray[np.int32]
+    """[T, N] best predecessor, -1 at the start."""
+    bound: Floats
+    """[T, B] lower bound of phi over a ball."""
+    unknown: Floats
+    """[T, C] lower bound of phi of a row that is not known."""
+    tree_order: Ints
+    """[T, C] trees by rising bound."""
+    least: Floats
+    """[T] smallest phi."""
+    least_at: Ints
+
+    @classmethod
+    def empty(cls, count: int, tables: Tables) -> _State:
+        n, balls, trees = len(tables.node), len(tables.radii), len(tables.roots) - 1
+        shape = (count, n)
+        known = np.zeros(shape, np.uint8)
+        filled = (np.empty(shape), known, np.empty(shape, np.int32), np.empty((count, balls)), np.empty((count, trees)))
+        return cls(*filled, np.empty((count, trees), np.int64), np.empty(count), np.empty(count, np.int64))
+
+
+def _tables(nodes: MotionNodes, weights: Weights, forest: Forest, ends: Floats, tree_visemes: Ints) -> Tables:
+    order = forest.order
+    row_of = np.full(len(order) + 1, -1, np.int64)
+    row_of[order] = np.arange(len(order))
+    lengths = nodes.lengths[order]
+    starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    picks = np.repeat(nodes.starts[order] - starts[:-1], lengths) + np.arange(starts[-1])
+    frames = np.ascontiguousarray(nodes.frames[picks])
+    return Tables(
+        node=order,
+        before=row_of[nodes.before[order]],
+        tree_of=forest.tree_of[order],
+        ends=np.ascontiguousarray(ends[order]),
+        joints=np.ascontiguousarray(start_vectors(nodes, weights)[order]),
+        frames=frames,
+        starts=starts,
+        bends=_bends(frames, starts),
+        ball_starts=forest.starts,
+        ball_stops=forest.stops,
+        left=forest.left,
+        right=forest.right,
+        centres=forest.centres,
+        radii=forest.radii,
+        roots=forest.roots,
+        tree_visemes=tree_visemes,
+        visemes=nodes.visemes[order],
+    )
+
+
+def _tree_targets(index: SearchIndex, query: Query) -> Floats:
+    """[T, C] OC + EMP, which all rows of a tree share."""
+    weights = index.weights
+    wanted = query.phones[:, None]
+    same_viseme = index.tables.tree_visemes == query.visemes[:, None]
+    other = np.where(same_viseme, weights.gamma, 1.0) * weights.delta * weights.pnt
+    cost = np.where((wanted >= 0) & (index.tree_phones != wanted), other, 0.0)
+    feeling = query.emotions[:, None]
+    return cost + np.where((feeling >= 0) & (index.tree_emotions != feeling), weights.phi * weights.pnt, 0.0)
+
+
+def _backtrack(state: _State, count: int) -> Ints:
+    rows = np.empty(count, np.int64)
+    rows[-1] = state.least_at[-1]
+    for t in range(count - 1, 0, -1):
+        rows[t - 1] = state.back[t, rows[t]]
+    return rows
+
+
+@njit(cache=True)
+def _bends(frames, starts):  # type: ignore[no-untyped-def]
+    bends = np.zeros_like(frames)
+    for row in range(len(starts) - 1):
+        a, length = starts[row], starts[row + 1] - starts[row]
+        for k in range(length - 2):
+            for d in range(frames.shape[1]):
+                w = k / (length - 1), (k + 1) / (length - 1), (k + 2) / (length - 1)
+                bends[a + k, d] = w[0] * frames[a + k, d] - 2 * w[1] * frames[a + k + 1, d] + w[2] * frames[a + k + 2, d]
+    return bends
+
+
+@njit(cache=True)
+def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+    """Compute the phi of position t that may be its smallest; bound all the others."""
+    floor = state.least[t - 1] if t else 0.0
+    for tree in range(targets.shape[1]):
+        state.unknown[t, tree] = floor + targets[t, tree]
+        if fixed[t] >= 0 and tree != tables.tree_of[fixed[t]]:
+            state.unknown[t, tree] = np.inf
+    state.least[t], state.least_at[t] = np.inf, -1
+    for tree in np.argsort(state.unknown[t], kind="mergesort"):
+        if state.unknown[t, tree] > state.least[t] * MARGIN or state.unknown[t, tree] == np.inf:
+            _fill_bounds(t, tree, tables, state)
+            continue
+        for row in range(tables.ball_starts[tables.roots[tree]], tables.ball_stops[tables.roots[tree]]):
+            if fixed[t] >= 0 and row != fixed[t]:
+                continue
+            _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha)
+            phi, best = state.phi[t, row], state.least[t]
+            if phi < best or (phi == best and tables.node[row] < tables.node[state.least_at[t]]):
+                state.least[t], state.least_at[t] = phi, row
+        _tighten_bounds(t, tree, tables, state)
+    roots = tables.roots[:-1]
+    state.tree_order[t] = np.argsort(state.bound[t][roots], kind="mergesort")
+
+
+@njit(cache=True)
+def _fill_bounds(t, tree, tables, state):  # type: ignore[no-untyped-def]
+    for ball in range(tables.roots[tree], tables.roots[tree + 1]):
+        state.bound[t, ball] = state.unknown[t, tree]
+
+
+@njit(cache=True)
+def _tighten_bounds(t, tree, tables, state):  # type: ignore[no-untyped-def]
+    for ball in range(tables.roots[tree + 1] - 1, tables.roots[tree] - 1, -1):
+        if tables.left[ball] >= 0:
+            state.bound[t, ball] = min(state.bound[t, tables.left[ball]], state.bound[t, tables.right[ball]])
+            continue
+        least = np.inf
+        for row in range(tables.ball_starts[ball], tables.ball_stops[ball]):
+            if state.known[t, row]:
+                least = min(least, state.phi[t, row])
+        state.bound[t, ball] = least
+
+
+@njit(cache=True)
+def _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+    """phi of one row; whatever unknown phi of earlier positions it asks for is computed first."""
+    stack = [row]
+    while len(stack):
+        at = t - len(stack) + 1
+        asked = _predecessor(at, stack[-1], tables, state, targets, fixed, beta, pnt, alpha)
+        if asked < 0:
+            stack.pop()
+        else:
+            stack.append(asked)
+
+
+@njit(cache=True)
+def _predecessor(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+    """Set phi and back of one row and return -1, or return a row of position t - 1 that must be known first."""
+    target = targets[t, tables.tree_of[row]]
+    if t == 0:
+        state.phi[t, row], state.back[t, row], state.known[t, row] = target, -1, 1
+        return -1
+    captured = tables.before[row]
+    if captured < 0:
+        state.phi[t, row], state.back[t, row] = state.least[t - 1] + alpha * pnt + target, state.least_at[t - 1]
+        state.known[t, row] = 1
+        return -1
+    best, best_row = np.inf, -1
+    if state.known[t - 1, captured]:
+        best, best_row = state.phi[t - 1, captured], captured
+    pile = np.empty(64, np.int64)
+    for tree in state.tree_order[t - 1]:
+        root = tables.roots[tree]
+        if state.bound[t - 1, root] > best * MARGIN or state.bound[t - 1, root] == np.inf:
+            break
+        switch = 0.0 if tables.tree_visemes[tree] == tables.visemes[captured] else pnt
+        height, pile[0] = 1, root
+        while height:
+            height -= 1
+            ball = pile[height]
+            if _ball_bound(t - 1, ball, row, tables, state) + switch > best * MARGIN:
+                continue
+            if tables.left[ball] >= 0:
+                pile[height], pile[height + 1] = tables.right[ball], tables.left[ball]
+                height += 2
+                continue
+            for i in range(tables.ball_starts[ball], tables.ball_stops[ball]):
+                if i == captured or (fixed[t - 1] >= 0 and i != fixed[t - 1]):
+                    continue
+                known = state.known[t - 1, i]
+                phi = state.phi[t - 1, i] if known else state.unknown[t - 1, tree]
+                if phi + switch > best * MARGIN:
+                    continue
+                joint = _squared_distance(tables.ends, i, tables.joints, row)
+                if phi + switch + joint > best * MARGIN:
+                    continue
+                cost = phi + (beta * _bending(tables, i, captured) + joint + switch)
+                if cost > best:
+                    continue
+                if not known:
+                    return i
+                if cost < best or tables.node[i] < tables.node[best_row]:
+                    best, best_row = cost, i
+    if not state.known[t - 1, captured] and (fixed[t - 1] < 0 or captured == fixed[t - 1]):
+        if state.unknown[t - 1, tables.tree_of[captured]] <= best:
+            return captured
+    state.phi[t, row], state.back[t, row], state.known[t, row] = best + target, best_row, 1
+    return -1
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _squared_distance(a, i, b, j):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for v in range(a.shape[1]):
+        difference = a[i, v] - b[j, v]
+        total += difference * difference
+    return total
+
+
+@njit(cache=True)
+def _ball_bound(t, ball, row, tables, state):  # type: ignore[no-untyped-def]
+    distance = np.sqrt(_squared_distance(tables.centres, ball, tables.joints, row))
+    gap = max(0.0, distance - tables.radii[ball] * MARGIN)
+    return state.bound[t, ball] + gap * gap
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _bending(tables, i, p):  # type: ignore[no-untyped-def]
+    """DSC(i, p): i is stretched to p's length, weighted by 1 - w, and its second difference added to p's."""
+    a, length_i = tables.starts[i], tables.starts[i + 1] - tables.starts[i]
+    b, length = tables.starts[p], tables.starts[p + 1] - tables.starts[p]
+    width = tables.frames.shape[1]
+    if length < 3:
+        return 0.0
+    fade = np.empty((length, width))
+    for k in range(length):
+        at = k * (length_i - 1) / (length - 1)
+        low = min(int(at), max(length_i - 2, 0))
+        share, high = at - low, min(low + 1, length_i - 1)
+        w = 1 - k / (length - 1)
+        for d in range(width):
+            fade[k, d] = w * (tables.frames[a + low, d] * (1 - share) + tables.frames[a + high, d] * share)
+    total = 0.0
+    for k in range(length - 2):
+        for d in range(width):
+            bend = fade[k, d] - 2 * fade[k + 1, d] + fade[k + 2, d] + tables.bends[b + k, d]
+            total += bend * bend
+    return total
