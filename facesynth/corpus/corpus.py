@@ -17,7 +17,7 @@ from facesynth.corpus.header import Header, read_header, write_header
 from facesynth.corpus.journal import ADDED, AddedNode, Edit, Journal, node_name, parse_node
 from facesynth.corpus.provenance import duration_s, provenance
 from facesynth.corpus.record import Record, read_records, write_records
-from facesynth.corpus.signals import hash_signals, read_motion, read_utterance, write_signals
+from facesynth.corpus.signals import hash_file, hash_signals, read_motion, read_utterance, write_signals
 from facesynth.corpus.splits import fold_ids, split_ids
 from facesynth.corpus.utterance import Utterance
 from facesynth.errors import FacesynthError, unknown
@@ -194,22 +194,26 @@ class Corpus:
         """What a saved model states of its recordings: performer, licences, consents, size, hash."""
         return provenance(self.files, self.header, self.usable_records)
 
-    def add_utterance(self, record: Record, speech: Speech, motion: Motion, words: Sequence[Segment] = ()) -> Record:
-        """Write an utterance's files and then its line in utterances.csv, and return the record as it was kept.
+    def add_utterance(
+        self, record: Record, speech: Speech, motion: Motion, words: Sequence[Segment] = (), *, aligned: bool = False
+    ) -> Record:
+        """Write an utterance's files and then its line in utterances.csv; returns the record as it was kept.
 
-        Interrupted at any moment, the corpus holds what it held. Adding the same sound and motion under the same id
-        again changes nothing, whatever was corrected by hand since; another recording under that id is refused.
+        aligned: whether a program placed the phones, so that `align` may place them anew. Interrupted at any moment,
+        the corpus holds what it held. Adding the same sound and motion under the same id again changes nothing,
+        whatever was corrected by hand since; another recording under that id is refused.
         """
         self._check_fits(record, speech, motion)
-        record = replace(record, source_hash=hash_signals(speech, motion))
+        record = replace(record, source_hash=hash_signals(speech.audio, speech.sample_rate, motion))
         with self._writing() as records:
             old = _same_name(record.id, records)
             if old and (old.id != record.id or old.source_hash != record.source_hash):
                 raise FacesynthError(f"{self.path} has another recording called {old.id!r}; give this one another id")
             if old is None or not self._is_complete(record.id):
                 write_signals(self.files, record, speech, motion, words)
-            records.setdefault(record.id, record)
-        self._records = dict(sorted({**self._records, record.id: records[record.id]}.items()))
+                written = hash_file(self.files.phones(record.id)) if aligned else ""
+                records[record.id] = replace(old or record, aligned_hash=written)
+        self._remember(records[record.id])
         return records[record.id]
 
     def update(self, record: Record) -> None:
@@ -218,7 +222,7 @@ class Corpus:
         self._check_emotion(record.emotion)
         with self._writing() as records:
             records[record.id] = record
-        self._records[record.id] = record
+        self._remember(record)
 
     @property
     def journal(self) -> Journal:
@@ -281,6 +285,9 @@ class Corpus:
             )
         if not len(motion) or np.isinf(motion.frames).any():
             raise FacesynthError(f"the motion of {record.id!r} is empty or holds infinite values")
+
+    def _remember(self, record: Record) -> None:
+        self._records = dict(sorted({**self._records, record.id: record}.items()))
 
     def _is_complete(self, utterance_id: str) -> bool:
         wanted = (self.files.audio(utterance_id), self.files.phones(utterance_id), self.files.motion(utterance_id))

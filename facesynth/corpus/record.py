@@ -68,14 +68,22 @@ def plain_words(text: str) -> str:
 
 
 def read_records(path: Path) -> dict[str, Record]:
-    """Records by id; errors name the line."""
+    """Records by id; the error names the first line that is wrong."""
+    records, faults = parse_records(path)
+    if faults:
+        raise FacesynthError(f"{path}{faults[0]}")
+    return records
+
+
+def parse_records(path: Path) -> tuple[dict[str, Record], list[str]]:
+    """Records by id, and everything that is wrong with the file, each as `, line n: what`."""
     if not path.is_file():
-        raise FacesynthError(f"{path} is missing; a corpus lists its utterances there")
+        return {}, [" is missing; a corpus lists its utterances there"]
     try:
         reader = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline=""), strict=True)
-        return _parsed(path, reader)
+        return _parsed(reader)
     except (UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error}); export it again") from None
+        return {}, [f" cannot be read as CSV in UTF-8 ({error}); export it again"]
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:
@@ -87,24 +95,26 @@ def write_records(path: Path, records: Iterable[Record]) -> None:
     write_text(path, text.getvalue())
 
 
-def _parsed(path: Path, reader: csv.DictReader[str]) -> dict[str, Record]:
-    for column in reader.fieldnames or ():
-        if column not in COLUMNS:
-            raise FacesynthError(f"{path}: {unknown('column', column, COLUMNS)}")
-    if "id" not in (reader.fieldnames or ()):
-        raise FacesynthError(f"{path} has no column 'id'; its first line must name the columns: {','.join(COLUMNS)}")
+def _parsed(reader: csv.DictReader[str]) -> tuple[dict[str, Record], list[str]]:
+    columns = reader.fieldnames or ()
+    faults = [f", line 1: {unknown('column', column, COLUMNS)}" for column in columns if column not in COLUMNS]
+    if "id" not in columns:
+        faults.append(f", line 1: there is no column 'id'; the columns are {','.join(COLUMNS)}")
+    if faults:
+        return {}, faults
     records: dict[str, Record] = {}
     folded: set[str] = set()
     for row in reader:
         try:
             record = _record(row)
+            if record.id.casefold() in folded:
+                raise FacesynthError(f"utterance {record.id!r} is listed twice; remove one")
         except ValueError as error:
-            raise FacesynthError(f"{path}, line {reader.line_num}: {error}") from None
-        if record.id.casefold() in folded:
-            raise FacesynthError(f"{path}, line {reader.line_num}: utterance {record.id!r} is listed twice; remove one")
+            faults.append(f", line {reader.line_num}: {error}")
+            continue
         folded.add(record.id.casefold())
         records[record.id] = record
-    return records
+    return records, faults
 
 
 def _record(row: Mapping[str | None, str | None]) -> Record:

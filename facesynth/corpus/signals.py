@@ -72,8 +72,8 @@ def read_motion(path: Path, header: Header) -> Motion:
     if not path.is_file():
         raise FacesynthError(f"{path} is missing; add the utterance again")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in ("frames", "head", "eyes", "fps") if name in file}
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in ("frames", "head", "eyes", "fps") if name in stored}
     except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile) as error:
         raise FacesynthError(f"{path} is not a motion file, or is damaged ({error}); add the utterance again") from None
     if "frames" not in arrays:
@@ -109,10 +109,10 @@ def fit_length(signal: NDArray[np.float32], frames: int, fps: float) -> NDArray[
     return np.concatenate([signal, tail])
 
 
-def hash_signals(speech: Speech, motion: Motion) -> str:
+def hash_signals(audio: NDArray[np.float32], sample_rate: int, motion: Motion) -> str:
     """sha256 of the sound and the motion of a recording, whatever is said of it."""
-    digest = hashlib.sha256(f"{speech.sample_rate} {motion.fps:.6f}".encode())
-    for array in (speech.audio, motion.frames, motion.head, motion.eyes):
+    digest = hashlib.sha256(f"{sample_rate} {motion.fps:.6f}".encode())
+    for array in (audio, motion.frames, motion.head, motion.eyes):
         digest.update(b"none" if array is None else str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
