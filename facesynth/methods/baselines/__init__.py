@@ -1,0 +1,1 @@
+"""Reference methods, without which no figure of another method can be judged."""

@@ -1,0 +1,41 @@
+"""The mean face: what an error means that knows nothing of the speech."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.methods.baselines.frames import mean_pose, refuse_options
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.motion.motion import Motion
+from facesynth.speech.speech import Speech
+
+
+@register("mean_face")
+class MeanFace(Method):
+    """Every frame is the mean of all recorded frames; missing samples do not count."""
+
+    mean: Tensor
+    """[C]"""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(0))
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Take the mean of what was recorded."""
+        self.learned_from(corpus)
+        self.mean = torch.from_numpy(mean_pose(corpus).astype(np.float32))
+        return self.eval()
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """The mean pose, for as long as the phones last."""
+        refuse_options(self.name, options)
+        layout = self.fitted_layout
+        count = int(speech.phones.frame_bounds(self.fps)[-1])
+        return Motion(np.tile(self.mean.cpu().numpy(), (count, 1)), self.fps, layout)

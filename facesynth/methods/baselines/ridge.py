@@ -1,0 +1,142 @@
+"""Ridge: what a linear map from sound to motion reaches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.methods.baselines.frames import complete, complete_frames, refuse_options
+from facesynth.methods.baselines.hearing import Hearing
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.motion.motion import Motion
+from facesynth.motion.pca import Pca
+from facesynth.progress import track
+from facesynth.speech.speech import Speech
+
+OFFSETS_S = np.linspace(-0.2, 0.2, 21)
+"""Where around a frame the sound is heard, s."""
+ALPHAS = 10.0 ** np.arange(-6, 2.1, 0.5)
+"""Penalties tried, as shares of the mean variance of an input."""
+HELD_OUT_SHARE = 0.2
+"""Share of the sentences that choose the penalty."""
+
+
+@register("ridge")
+class Ridge(Method):
+    """Linear regression from 40 log-mel bands at 21 times over ±200 ms to 25 principal components of the motion.
+
+    The penalty is the one that predicts a fifth of the training sentences best from the others; the weights are then
+    learned from all.
+    """
+
+    weights: Tensor
+    """[840, D]"""
+    bias: Tensor
+    """[D]"""
+
+    def __init__(self, components: int = 25) -> None:
+        super().__init__(components=components)
+        self.components = components
+        self.hearing = Hearing()
+        self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
+        self.register_buffer("weights", torch.zeros(0, 0))
+        self.register_buffer("bias", torch.zeros(0))
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Learn from the complete frames of a corpus; FacesynthError where it has a single sentence."""
+        self.learned_from(corpus)
+        held_out = _held_out(corpus, seed)
+        self.pca = Pca.fit(complete_frames(corpus), self.components)
+        self.hearing.learn(corpus)
+        parts = self._moments(corpus, held_out)
+        together = parts[0] + parts[1]
+        errors = [parts[1].error(*weights) for weights in parts[0].solutions()]
+        best = int(np.argmin(errors))
+        weights, bias = together.solutions()[best]
+        self.weights, self.bias = torch.from_numpy(weights).float(), torch.from_numpy(bias).float()
+        self.facts = {"alpha": float(ALPHAS[best]), "held_out_rms": float(np.sqrt(errors[best]))}
+        return self.eval()
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """Motion predicted frame by frame."""
+        refuse_options(self.name, options)
+        layout = self.fitted_layout
+        count = int(speech.phones.frame_bounds(self.fps)[-1])
+        frames = self.pca.decode(self._heard(speech, count) @ self.weights + self.bias)
+        return Motion(frames.cpu().numpy(), self.fps, layout)
+
+    def _heard(self, speech: Speech, count: int) -> Tensor:
+        """[T, 840] bands around each of `count` frames."""
+        return self.hearing.at(speech, (np.arange(count) / self.fps)[:, None] + OFFSETS_S).flatten(1)
+
+    def _moments(self, corpus: Corpus, held_out: frozenset[str]) -> tuple[Moments, Moments]:
+        """Sums over the sentences to learn from, and over those held out."""
+        inputs, outputs = self.hearing.mel.bands * len(OFFSETS_S), self.pca.basis.shape[1]
+        parts = Moments.zero(inputs, outputs), Moments.zero(inputs, outputs)
+        for utterance in track(corpus, "ridge: listening", len(corpus)):
+            present = complete(utterance.motion.frames)
+            heard = self._heard(utterance.speech, len(utterance.motion))[present]
+            moved = self.pca.encode(torch.from_numpy(utterance.motion.frames[present]))
+            parts[utterance.sentence in held_out].add(heard.numpy(), moved.numpy())
+        return parts
+
+
+@dataclass
+class Moments:
+    """Sums of x [N, I], y [N, O] and their products: all that least squares needs, whatever N is."""
+
+    count: int
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    xx: NDArray[np.float64]
+    xy: NDArray[np.float64]
+    yy: float
+
+    @classmethod
+    def zero(cls, inputs: int, outputs: int) -> Self:
+        """Of no samples."""
+        return cls(0, np.zeros(inputs), np.zeros(outputs), np.zeros((inputs, inputs)), np.zeros((inputs, outputs)), 0.0)
+
+    def add(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> None:
+        """Count samples x [N, I], y [N, O]; products in float32, which standardised inputs bear, sums in float64."""
+        self.count += len(x)
+        self.x += x.sum(axis=0, dtype=np.float64)
+        self.y += y.sum(axis=0, dtype=np.float64)
+        self.xx += x.T @ x
+        self.xy += x.T @ y
+        self.yy += float(np.square(y, dtype=np.float64).sum())
+
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(*(getattr(self, name) + getattr(other, name) for name in ("count", "x", "y", "xx", "xy", "yy")))
+
+    def solutions(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Weights [I, O] and bias [O] for each of ALPHAS, from one eigendecomposition of the covariance."""
+        x, y = self.x / self.count, self.y / self.count
+        variance, directions = np.linalg.eigh(self.xx / self.count - np.outer(x, x))
+        along = directions.T @ (self.xy / self.count - np.outer(x, y))
+        scale = variance.clip(min=0).mean()
+        weights = [directions @ (along / (variance.clip(min=0) + alpha * scale)[:, None]) for alpha in ALPHAS]
+        return [(w, y - x @ w) for w in weights]
+
+    def error(self, weights: NDArray[np.float64], bias: NDArray[np.float64]) -> float:
+        """Mean over the samples of ‖x W + b - y‖²."""
+        predicted = np.sum(weights * (self.xx @ weights)) + 2 * self.x @ weights @ bias + self.count * bias @ bias
+        return float((predicted - 2 * np.sum(weights * self.xy) - 2 * self.y @ bias + self.yy) / self.count)
+
+
+def _held_out(corpus: Corpus, seed: int) -> frozenset[str]:
+    sentences = sorted({record.sentence_key for record in corpus.usable_records})
+    if len(sentences) < 2:
+        raise FacesynthError(
+            f"ridge chooses its penalty on held-out sentences and needs at least two; got {len(sentences)}: record more"
+        )
+    count = max(1, round(HELD_OUT_SHARE * len(sentences)))
+    return frozenset(np.random.default_rng(seed).permutation(np.array(sentences, object))[:count])
