@@ -6,9 +6,10 @@ The recursion (Deng 2008, Algorithm 1) is
 
 and Θ(N²T) as written. Three facts make it fast without an approximation:
 
-* phi_t(j) is needed only for the nodes that the next step may build on. OC and EMP are the same for
-  all nodes of one (phone, emotion), and `min phi_t-1 + OC + EMP` bounds them all from below, so
-  whole classes stay unevaluated until some successor really asks for one of their nodes.
+* phi_t(j) is needed only for the nodes that the next step may build on. A bound that costs O(1) a
+  node, `OC + EMP + min(phi_t-1(pre(j)), least phi_t-1 of pre(j)'s viseme + nearest(j), least phi_t-1
+  + PNT)`, takes its place until a successor really asks for that node; `nearest(j)` is the cheapest
+  step from that viseme to j, which does not depend on the input.
 * PVC is a squared Euclidean distance, so a ball tree over the end vectors, with the smallest phi of
   each ball, finds the best predecessor of j without visiting the others.
 * DSC is never negative: it is computed for the few pairs that PVC alone does not rule out.
@@ -63,6 +64,8 @@ class Tables(NamedTuple):
     """[C] viseme class of each tree."""
     visemes: Ints
     """[N] viseme class of each row."""
+    nearest: Floats
+    """[N] least TC of a step to the row from the viseme of its pre, other than from pre itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,7 @@ def build_index(nodes: MotionNodes, weights: Weights) -> SearchIndex:
     ends = end_vectors(nodes, weights)
     forest = grow_forest(ends, tree_of)
     tables = _tables(nodes, weights, forest, ends, nodes.visemes[first])
+    _find_nearest(tables, weights.beta)
     return SearchIndex(tables, nodes.phones[first], nodes.emotions[first], nodes, weights)
 
 
@@ -120,27 +124,27 @@ def search(index: SearchIndex, query: Query) -> Path:
 
 class _State(NamedTuple):
     phi: Floats
-    """[T, N] where known."""
+    """[T, N] where known, else a lower bound."""
     known: NDArray[np.uint8]
     back: NDArray[np.int32]
     """[T, N] best predecessor, -1 at the start."""
     bound: Floats
     """[T, B] lower bound of phi over a ball."""
-    unknown: Floats
-    """[T, C] lower bound of phi of a row that is not known."""
     tree_order: Ints
     """[T, C] trees by rising bound."""
     least: Floats
     """[T] smallest phi."""
     least_at: Ints
+    viseme_bound: Floats
+    """[V] lower bound of phi over each viseme class at the last position."""
 
     @classmethod
     def empty(cls, count: int, tables: Tables) -> _State:
         n, balls, trees = len(tables.node), len(tables.radii), len(tables.roots) - 1
         shape = (count, n)
         known = np.zeros(shape, np.uint8)
-        filled = (np.empty(shape), known, np.empty(shape, np.int32), np.empty((count, balls)), np.empty((count, trees)))
-        return cls(*filled, np.empty((count, trees), np.int64), np.empty(count), np.empty(count, np.int64))
+        filled = (np.empty(shape), known, np.empty(shape, np.int32), np.empty((count, balls)), np.empty((count, trees), np.int64))
+        return cls(*filled, np.empty(count), np.empty(count, np.int64), np.empty(int(tables.visemes.max()) + 1))
 
 
 def _tables(nodes: MotionNodes, weights: Weights, forest: Forest, ends: Floats, tree_visemes: Ints) -> Tables:
@@ -169,6 +173,7 @@ def _tables(nodes: MotionNodes, weights: Weights, forest: Forest, ends: Floats, 
         roots=forest.roots,
         tree_visemes=tree_visemes,
         visemes=nodes.visemes[order],
+        nearest=np.zeros(len(order)),
     )
 
 
@@ -192,6 +197,34 @@ def _backtrack(state: _State, count: int) -> Ints:
 
 
 @njit(cache=True)
+def _find_nearest(tables, beta):  # type: ignore[no-untyped-def]
+    pile = np.empty(64, np.int64)
+    for row in range(len(tables.node)):
+        captured = tables.before[row]
+        if captured < 0:
+            continue
+        best = np.inf
+        for tree in range(len(tables.tree_visemes)):
+            if tables.tree_visemes[tree] != tables.visemes[captured]:
+                continue
+            height, pile[0] = 1, tables.roots[tree]
+            while height:
+                height -= 1
+                ball = pile[height]
+                if _gap(tables, ball, row) >= best:
+                    continue
+                if tables.left[ball] >= 0:
+                    pile[height], pile[height + 1] = tables.right[ball], tables.left[ball]
+                    height += 2
+                    continue
+                for i in range(tables.ball_starts[ball], tables.ball_stops[ball]):
+                    joint = _squared_distance(tables.ends, i, tables.joints, row)
+                    if i != captured and joint < best:
+                        best = min(best, joint + beta * _bending(tables, i, captured))
+        tables.nearest[row] = best / MARGIN
+
+
+@njit(cache=True)
 def _bends(frames, starts):  # type: ignore[no-untyped-def]
     bends = np.zeros_like(frames)
     for row in range(len(starts) - 1):
@@ -206,44 +239,52 @@ def _bends(frames, starts):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
     """Compute the phi of position t that may be its smallest; bound all the others."""
-    floor = state.least[t - 1] if t else 0.0
-    for tree in range(targets.shape[1]):
-        state.unknown[t, tree] = floor + targets[t, tree]
-        if fixed[t] >= 0 and tree != tables.tree_of[fixed[t]]:
-            state.unknown[t, tree] = np.inf
+    _bound_rows(t, tables, state, targets, fixed, pnt, alpha)
+    _bound_balls(t, tables, state)
     state.least[t], state.least_at[t] = np.inf, -1
-    for tree in np.argsort(state.unknown[t], kind="mergesort"):
-        if state.unknown[t, tree] > state.least[t] * MARGIN or state.unknown[t, tree] == np.inf:
-            _fill_bounds(t, tree, tables, state)
-            continue
-        for row in range(tables.ball_starts[tables.roots[tree]], tables.ball_stops[tables.roots[tree]]):
-            if fixed[t] >= 0 and row != fixed[t]:
+    for tree in np.argsort(state.bound[t][tables.roots[:-1]], kind="mergesort"):
+        root = tables.roots[tree]
+        if state.bound[t, root] > state.least[t] * MARGIN or state.bound[t, root] == np.inf:
+            break
+        for row in range(tables.ball_starts[root], tables.ball_stops[root]):
+            if state.phi[t, row] > state.least[t] * MARGIN or state.phi[t, row] == np.inf:
                 continue
             _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha)
             phi, best = state.phi[t, row], state.least[t]
             if phi < best or (phi == best and tables.node[row] < tables.node[state.least_at[t]]):
                 state.least[t], state.least_at[t] = phi, row
-        _tighten_bounds(t, tree, tables, state)
-    roots = tables.roots[:-1]
-    state.tree_order[t] = np.argsort(state.bound[t][roots], kind="mergesort")
+    _bound_balls(t, tables, state)
+    state.tree_order[t] = np.argsort(state.bound[t][tables.roots[:-1]], kind="mergesort")
+    state.viseme_bound[:] = np.inf
+    for row in range(len(tables.node)):
+        viseme = tables.visemes[row]
+        state.viseme_bound[viseme] = min(state.viseme_bound[viseme], state.phi[t, row])
 
 
 @njit(cache=True)
-def _fill_bounds(t, tree, tables, state):  # type: ignore[no-untyped-def]
-    for ball in range(tables.roots[tree], tables.roots[tree + 1]):
-        state.bound[t, ball] = state.unknown[t, tree]
+def _bound_rows(t, tables, state, targets, fixed, pnt, alpha):  # type: ignore[no-untyped-def]
+    for row in range(len(tables.node)):
+        bound = 0.0
+        if fixed[t] >= 0 and row != fixed[t]:
+            bound = np.inf
+        elif t > 0 and tables.before[row] < 0:
+            bound = state.least[t - 1] + alpha * pnt
+        elif t > 0:
+            captured = tables.before[row]
+            alike = state.viseme_bound[tables.visemes[captured]] + tables.nearest[row]
+            bound = min(state.phi[t - 1, captured], alike, state.least[t - 1] + pnt)
+        state.phi[t, row] = bound + targets[t, tables.tree_of[row]]
 
 
 @njit(cache=True)
-def _tighten_bounds(t, tree, tables, state):  # type: ignore[no-untyped-def]
-    for ball in range(tables.roots[tree + 1] - 1, tables.roots[tree] - 1, -1):
+def _bound_balls(t, tables, state):  # type: ignore[no-untyped-def]
+    for ball in range(len(tables.radii) - 1, -1, -1):
         if tables.left[ball] >= 0:
             state.bound[t, ball] = min(state.bound[t, tables.left[ball]], state.bound[t, tables.right[ball]])
             continue
         least = np.inf
         for row in range(tables.ball_starts[ball], tables.ball_stops[ball]):
-            if state.known[t, row]:
-                least = min(least, state.phi[t, row])
+            least = min(least, state.phi[t, row])
         state.bound[t, ball] = least
 
 
@@ -264,13 +305,10 @@ def _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type:
 def _predecessor(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
     """Set phi and back of one row and return -1, or return a row of position t - 1 that must be known first."""
     target = targets[t, tables.tree_of[row]]
-    if t == 0:
-        state.phi[t, row], state.back[t, row], state.known[t, row] = target, -1, 1
-        return -1
     captured = tables.before[row]
-    if captured < 0:
-        state.phi[t, row], state.back[t, row] = state.least[t - 1] + alpha * pnt + target, state.least_at[t - 1]
-        state.known[t, row] = 1
+    if t == 0 or captured < 0:
+        state.back[t, row] = state.least_at[t - 1] if t else -1
+        state.known[t, row] = 1  # the bound of such a row is exact
         return -1
     best, best_row = np.inf, -1
     if state.known[t - 1, captured]:
@@ -285,32 +323,29 @@ def _predecessor(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # ty
         while height:
             height -= 1
             ball = pile[height]
-            if _ball_bound(t - 1, ball, row, tables, state) + switch > best * MARGIN:
+            offer = state.bound[t - 1, ball] + switch
+            if offer > best * MARGIN or offer + _gap(tables, ball, row) > best * MARGIN:
                 continue
             if tables.left[ball] >= 0:
                 pile[height], pile[height + 1] = tables.right[ball], tables.left[ball]
                 height += 2
                 continue
             for i in range(tables.ball_starts[ball], tables.ball_stops[ball]):
-                if i == captured or (fixed[t - 1] >= 0 and i != fixed[t - 1]):
-                    continue
-                known = state.known[t - 1, i]
-                phi = state.phi[t - 1, i] if known else state.unknown[t - 1, tree]
-                if phi + switch > best * MARGIN:
+                phi = state.phi[t - 1, i]
+                if i == captured or phi + switch > best * MARGIN or phi == np.inf:
                     continue
                 joint = _squared_distance(tables.ends, i, tables.joints, row)
                 if phi + switch + joint > best * MARGIN:
                     continue
                 cost = phi + (beta * _bending(tables, i, captured) + joint + switch)
-                if cost > best:
+                if cost > best * MARGIN:
                     continue
-                if not known:
+                if not state.known[t - 1, i]:
                     return i
-                if cost < best or tables.node[i] < tables.node[best_row]:
+                if cost < best or (cost == best and tables.node[i] < tables.node[best_row]):
                     best, best_row = cost, i
-    if not state.known[t - 1, captured] and (fixed[t - 1] < 0 or captured == fixed[t - 1]):
-        if state.unknown[t - 1, tables.tree_of[captured]] <= best:
-            return captured
+    if not state.known[t - 1, captured] and state.phi[t - 1, captured] <= best * MARGIN and state.phi[t - 1, captured] < np.inf:
+        return captured
     state.phi[t, row], state.back[t, row], state.known[t, row] = best + target, best_row, 1
     return -1
 
@@ -325,10 +360,11 @@ def _squared_distance(a, i, b, j):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _ball_bound(t, ball, row, tables, state):  # type: ignore[no-untyped-def]
+def _gap(tables, ball, row):  # type: ignore[no-untyped-def]
+    """Least PVC from any member of a ball to a row."""
     distance = np.sqrt(_squared_distance(tables.centres, ball, tables.joints, row))
     gap = max(0.0, distance - tables.radii[ball] * MARGIN)
-    return state.bound[t, ball] + gap * gap
+    return gap * gap
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
