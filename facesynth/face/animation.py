@@ -1,0 +1,251 @@
+"""What a face does over time: 52 weights, the head, the gaze and the tongue, at one rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facesynth.errors import FacesynthError
+from facesynth.face.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
+from facesynth.face.markers import LipGap, marker_vertices
+from facesynth.face.rig import ARKIT_NAMES, LOOK_DOWN_RAD, LOOK_OUT_RAD, LOOK_UP_RAD, PIVOT_MM, Rig, gaze_weights
+from facesynth.face.tongue import TIP_OUT, TIP_UP, tongue_track
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+from facesynth.motion.pose import rigid_points
+from facesynth.speech.speech import PhoneTrack
+
+BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
+ALREADY_BLINKS = 0.5
+"""A motion whose lids shut this far has blinks of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceAnimation:
+    """T frames of a rigged face; all arrays are kept as float32."""
+
+    names: tuple[str, ...]
+    """N shapes; the columns of `weights`."""
+    weights: NDArray[Any]
+    """[T, N] 0..1."""
+    head: NDArray[Any]
+    """[T, 6] rotation vector (rad) and translation (mm) of the head about the rig's pivot."""
+    gaze: NDArray[Any]
+    """[T, 2] direction of both eyes in the head: to the performer's left, up (rad)."""
+    tongue_up: NDArray[Any]
+    """[T] 0..1, how far the tip of the tongue is lifted; no ARKit shape does that."""
+    fps: float
+    """Frames per second, Hz."""
+    residual_mm: NDArray[Any] | None = None
+    """[T] root mean square distance of the solved markers from the asked ones, where weights were solved."""
+
+    def __post_init__(self) -> None:
+        count = len(np.asarray(self.weights))
+        shapes = {"weights": (count, len(self.names)), "head": (count, 6), "gaze": (count, 2), "tongue_up": (count,)}
+        if self.residual_mm is not None:
+            shapes["residual_mm"] = (count,)
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, _checked(getattr(self, name), shape, name))
+        if not count or not (np.isfinite(self.fps) and self.fps > 0):
+            raise FacesynthError(
+                f"an animation needs at least one frame and a positive fps; got {count} frames at {self.fps} fps"
+            )
+        if self.weights.min(initial=0.0) < 0 or self.weights.max(initial=0.0) > 1:
+            low, high = self.weights.min(), self.weights.max()
+            raise FacesynthError(f"weights must lie in 0..1; got {low:.3f}..{high:.3f}; clip them before")
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    @property
+    def duration_s(self) -> float:
+        """Number of frames over rate, seconds."""
+        return len(self) / self.fps
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """[T] time of each frame, seconds; frame 0 is at 0."""
+        return np.arange(len(self)) / self.fps
+
+    def weight(self, name: str) -> NDArray[np.float32]:
+        """[T] one shape's weights; zeros for a shape that this animation does not have."""
+        return self.weights[:, self.names.index(name)] if name in self.names else np.zeros(len(self), np.float32)
+
+    def weights_for(self, names: tuple[str, ...]) -> NDArray[np.float32]:
+        """[T, len(names)] weights in another rig's order of shapes."""
+        return np.stack([self.weight(name) for name in names], axis=1)
+
+    def resampled(self, fps: float) -> FaceAnimation:
+        """The same movement at another rate; 23.976 and 29.97 are fine.
+
+        Monotone cubic interpolation, which never leaves the range of its neighbours, so that weights
+        stay in 0..1 and a shut eye stays shut; the head turns on the shortest arc.
+        """
+        from scipy.interpolate import PchipInterpolator
+        from scipy.spatial.transform import Rotation, Slerp
+
+        if not (np.isfinite(fps) and fps > 0):
+            raise FacesynthError(f"fps must be positive; got {fps}")
+        if fps == self.fps or len(self) == 1:
+            return self if fps == self.fps else self._stretched(fps)
+        count = max(1, round(self.duration_s * fps))
+        at = np.minimum(np.arange(count) / fps, self.times_s[-1])
+        rotation = Slerp(self.times_s, Rotation.from_rotvec(self.head[:, :3]))(at).as_rotvec()
+
+        def curve(values: NDArray[Any]) -> NDArray[np.float64]:
+            return PchipInterpolator(self.times_s, values, axis=0)(at)
+
+        head = np.concatenate([rotation, curve(self.head[:, 3:])], axis=1)
+        weights = np.clip(curve(self.weights), 0, 1)
+        residual = None if self.residual_mm is None else curve(self.residual_mm)
+        return FaceAnimation(self.names, weights, head, curve(self.gaze), curve(self.tongue_up), fps, residual)
+
+    def _stretched(self, fps: float) -> FaceAnimation:
+        many = np.zeros(max(1, round(self.duration_s * fps)), np.int64)
+        residual = None if self.residual_mm is None else self.residual_mm[many]
+        return FaceAnimation(
+            self.names, self.weights[many], self.head[many], self.gaze[many], self.tongue_up[many], fps, residual
+        )
+
+
+def _checked(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float32]:
+    array = np.asarray(value, np.float32)
+    if array.shape != shape:
+        raise FacesynthError(f"{name} of an animation must have shape {list(shape)}; got {list(array.shape)}")
+    if not np.isfinite(array).all():
+        raise FacesynthError(f"{name} of an animation holds NaN or infinite values; fill the gaps first")
+    return array
+
+
+def animate(
+    motion: Motion,
+    rig: Rig,
+    *,
+    head_gain: float = 1.0,
+    eyes_gain: float = 1.0,
+    seed: int = 0,
+    phones: PhoneTrack | None = None,
+) -> FaceAnimation:
+    """Put a motion on a rig, at the motion's rate.
+
+    Markers become weights by bounded least squares on the rig; curves with ARKit names pass through. Blinks and
+    gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`.
+
+    Parameters
+    ----------
+    head_gain : factor on the head's turns and shifts; 0 keeps it still
+    eyes_gain : factor on the gaze; 0 keeps the eyes open and straight
+    """
+    for name, gain in (("head_gain", head_gain), ("eyes_gain", eyes_gain)):
+        if not (np.isfinite(gain) and gain >= 0):
+            raise FacesynthError(f"{name} must be 0 (off) or a positive factor; got {gain}")
+    _check_whole(motion)
+    head = _head_on(rig, motion, head_gain)
+    weights, residual = _weights(motion, rig)
+    gaze = _gaze(motion, head, seed) * eyes_gain
+    shut = _lids(motion, weights, seed) if eyes_gain else np.zeros(len(motion))
+    _set_lids(weights, shut, awake=eyes_gain == 0)
+    weights = gaze_weights(weights, gaze)
+    weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
+    tip = np.clip(tongue_track(TIP_UP, phones, len(motion), motion.fps), 0, 1)
+    return FaceAnimation(rig.names, np.clip(weights, 0, 1), head, gaze, tip, motion.fps, residual)
+
+
+def _check_whole(motion: Motion) -> None:
+    if not len(motion):
+        raise FacesynthError("a motion without frames cannot be put on a face")
+    for name in ("frames", "head", "eyes"):
+        values = getattr(motion, name)
+        if values is not None and not np.isfinite(values).all():
+            raise FacesynthError(f"{name} of the motion hold NaN or infinite values; fill the gaps first")
+
+
+def _weights(motion: Motion, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    if motion.layout.kind == "curves":
+        return _curves(motion), None
+    from facesynth.face.blendshapes import MarkerBasis, solve_markers
+
+    known = np.zeros((len(motion), len(rig.names)))
+    if motion.eyes is not None:
+        known = gaze_weights(known, motion.eyes[:, 1:])
+    return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
+
+
+def _curves(motion: Motion) -> NDArray[np.float64]:
+    columns = {name[:1].lower() + name[1:]: i for i, name in enumerate(motion.layout.names)}
+    shared = [name for name in ARKIT_NAMES if name in columns]
+    if not shared:
+        raise FacesynthError(
+            f"none of the curves {list(motion.layout.names[:4])} … has an ARKit name such as jawOpen; rename them"
+        )
+    weights = np.zeros((len(motion), len(ARKIT_NAMES)))
+    for name in shared:
+        weights[:, ARKIT_NAMES.index(name)] = np.clip(motion.frames[:, columns[name]], 0, 1)
+    return weights
+
+
+# A motion's pose turns the head about the centroid c of its neutral rigid markers, the rig's about its pivot p:
+# R (x - c) + c + t = R (x - p) + p + t'  with  t' = t + (R - 1)(p - c).
+def _head_on(rig: Rig, motion: Motion, gain: float) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    if motion.head is None:
+        return np.zeros((len(motion), 6))
+    head = motion.head.astype(np.float64) * gain
+    lever = PIVOT_MM - _pose_centre(rig, motion.layout)
+    head[:, 3:] += Rotation.from_rotvec(head[:, :3]).apply(lever) - lever
+    return head
+
+
+def _pose_centre(rig: Rig, layout: Layout) -> NDArray[np.float64]:
+    if layout.kind != "markers":
+        return PIVOT_MM
+    rigid = rigid_points(layout)
+    if layout.neutral is not None:
+        return np.asarray(layout.neutral).reshape(-1, 3)[rigid].mean(axis=0)
+    return rig.rest_mm[marker_vertices(rig, layout)[rigid]].mean(axis=0).astype(np.float64)
+
+
+def gaze_of(weights: ArrayLike) -> NDArray[np.float64]:
+    """[T, 2] gaze (rad, to the performer's left and up) that the eyeLook weights [T, 52] stand for: the mean of both eyes."""
+    look = dict(zip(ARKIT_NAMES, np.asarray(weights, np.float64).T, strict=True))
+    left = look["eyeLookOutLeft"] - look["eyeLookInLeft"] + look["eyeLookInRight"] - look["eyeLookOutRight"]
+    up = look["eyeLookUpLeft"] + look["eyeLookUpRight"]
+    down = look["eyeLookDownLeft"] + look["eyeLookDownRight"]
+    return np.stack([left * LOOK_OUT_RAD, up * LOOK_UP_RAD - down * LOOK_DOWN_RAD], axis=1) / 2
+
+
+def _gaze(motion: Motion, head: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    if motion.eyes is not None:
+        return motion.eyes[:, 1:].astype(np.float64)
+    curves = {f"eyeLook{way}Left" for way in ("In", "Out", "Up", "Down")} & set(motion.layout.names)
+    if curves:
+        return gaze_of(_curves(motion))
+    return quiet_gaze(len(motion), motion.fps, seed) + holding_the_viewer(head)
+
+
+def _lids(motion: Motion, weights: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    """[T] how far blinks shut the lids, on top of what the expression does."""
+    if motion.eyes is not None:
+        return np.clip(1 - motion.eyes[:, 0].astype(np.float64), 0, 1)
+    seen = weights[:, [ARKIT_NAMES.index(name) for name in BLINKS]].min(axis=1)
+    if (seen > ALREADY_BLINKS).any():
+        return np.zeros(len(motion))
+    return quiet_blinks(len(motion), motion.fps, seed)
+
+
+def _set_lids(weights: NDArray[np.float64], shut: NDArray[np.float64], *, awake: bool) -> None:
+    for side in ("Left", "Right"):
+        blink, squint, wide = (ARKIT_NAMES.index(f"eye{what}{side}") for what in ("Blink", "Squint", "Wide"))
+        weights[:, blink] = 0.0 if awake else np.maximum(weights[:, blink], shut)
+        weights[:, [squint, wide]] *= 1 - shut[:, None]
+
+
+def _tongue_out(weights: NDArray[np.float64], rig: Rig, phones: PhoneTrack | None, fps: float) -> NDArray[np.float64]:
+    """The tongue comes out between lips that are open; through shut lips it would show."""
+    own = weights[:, rig.index("tongueOut")[0]]
+    room = np.clip((LipGap.of(rig).opening_mm(weights) - 1.0) / 3.0, 0, 1)
+    return np.maximum(own, tongue_track(TIP_OUT, phones, len(weights), fps) * room)

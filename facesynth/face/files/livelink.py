@@ -1,0 +1,124 @@
+"""Live Link Face takes: a CSV of timecode, 52 weights and nine angles of head and eyes."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.atomic import write_text
+from facesynth.errors import FacesynthError
+from facesynth.face.animation import FaceAnimation
+from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, rate_of, timecode
+from facesynth.face.rig import ARKIT_NAMES
+
+ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
+HEADER = ("Timecode", "BlendshapeCount", *(name[0].upper() + name[1:] for name in ARKIT_NAMES), *ANGLES)
+COUNT = len(HEADER) - 2
+
+
+@dataclass(frozen=True, eq=False)
+class LiveLinkTake:
+    """A take as it stands in the file."""
+
+    timecodes: tuple[str, ...]
+    """T times of day, `HH:MM:SS:FF.mmm`."""
+    values: NDArray[np.float64]
+    """[T, 61] weights in Apple's order (0..1), then yaw, pitch and roll of head, left and right eye (rad)."""
+    fps: float
+    """Frames per second, Hz."""
+
+    def animation(self) -> FaceAnimation:
+        """The take as an animation; the gaze is the mean of both eyes, the head has no translation."""
+        angles = self.values[:, len(ARKIT_NAMES) :].reshape(-1, 3, 3)
+        head = np.concatenate([_rotation_vectors(angles[:, 0]), np.zeros((len(angles), 3))], axis=1)
+        gaze = -angles[:, 1:, :2].mean(axis=1)
+        weights = np.clip(self.values[:, : len(ARKIT_NAMES)], 0, 1)
+        return FaceAnimation(ARKIT_NAMES, weights, head, gaze, np.zeros(len(weights)), self.fps)
+
+
+def take_of(animation: FaceAnimation) -> LiveLinkTake:
+    """An animation as a take that starts at midnight; translation and tongue tip have no column and are left out."""
+    rate = nominal_rate(animation.fps)
+    gaze = -animation.gaze.astype(np.float64)
+    eye = np.concatenate([gaze, np.zeros((len(gaze), 1))], axis=1)
+    head = _angles(animation.head[:, :3].astype(np.float64))
+    values = np.concatenate([animation.weights_for(ARKIT_NAMES), head, eye, eye], axis=1)
+    return LiveLinkTake(tuple(timecode(t, rate) for t in animation.times_s), values, animation.fps)
+
+
+def write_livelink(path: str | Path, take: LiveLinkTake) -> None:
+    """Write a take as the app does, ten decimals, Unix line ends."""
+    rows = [",".join(HEADER)]
+    for time, values in zip(take.timecodes, take.values + 0.0, strict=True):  # + 0.0: no minus zeros
+        rows.append(f"{time},{COUNT}," + ",".join(f"{value:.10f}" for value in values))
+    write_text(path, "\n".join(rows) + "\n")
+
+
+def read_livelink(path: str | Path, fps: float | None = None) -> LiveLinkTake:
+    """Read a take; writing it again gives the same bytes.
+
+    The rate is read off the timecodes; a take of under a second does not show it and needs `fps`.
+    """
+    path = Path(path)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            header, *rows = [row for row in csv.reader(file) if row] or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
+    if tuple(header) != HEADER:
+        odd = next((got for got, wanted in zip(header, HEADER, strict=False) if got != wanted), f"{len(header)} columns")
+        raise FacesynthError(
+            f"{path} is no Live Link Face CSV: its header has {odd!r}; wanted {len(HEADER)} columns from Timecode on"
+        )
+    if not rows:
+        raise FacesynthError(f"{path} holds a header and no frames; record the take again")
+    values = _numbers(path, rows)
+    times = tuple(row[0] for row in rows)
+    return LiveLinkTake(times, values, fps if fps is not None else _fps(path, list(times)))
+
+
+def _numbers(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
+    for i, row in enumerate(rows):
+        if len(row) != len(HEADER):
+            raise FacesynthError(f"{path} row {i + 2} has {len(row)} values; wanted {len(HEADER)}; was the take cut off?")
+    try:
+        values = np.array([row[2:] for row in rows], np.float64)
+    except ValueError as error:
+        raise FacesynthError(f"{path} holds a value that is no number ({error})") from None
+    if not np.isfinite(values).all():
+        raise FacesynthError(f"{path} holds NaN or infinite values; remove those rows")
+    return values
+
+
+def _fps(path: Path, timecodes: list[str]) -> float:
+    frames, seconds = parse_timecodes(timecodes)
+    rate = rate_of(frames, seconds)
+    if rate is None:
+        raise FacesynthError(f"{path} is too short to show its frame rate; give fps=")
+    total = (seconds[-1] - seconds[0]) % 86400 * rate + frames[-1] - frames[0]
+    if total <= 0:
+        raise FacesynthError(f"{path}: the timecodes do not increase; give fps=")
+    fps = rate * (len(timecodes) - 1) / total
+    return float(rate) if abs(fps - rate) < 1e-4 * rate else exact_fps(fps)
+
+
+# Signs: in takes of the app, EyeLookInLeft (the left eye looks to the performer's right) goes with positive
+# LeftEyeYaw, EyeLookUp with negative pitch, in radians. The takes we have keep the head still, so for the head
+# we take the same signs: yaw to the performer's right, pitch down, and roll, as the mirror image of ARKit's
+# right-handed axes asks, to the performer's left shoulder; turned in the order yaw, pitch, roll.
+
+
+def _angles(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(rotation_vectors).as_euler("YXZ") * [-1.0, 1.0, -1.0]
+
+
+def _rotation_vectors(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler("YXZ", angles * [-1.0, 1.0, -1.0]).as_rotvec()

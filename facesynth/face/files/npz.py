@@ -1,0 +1,65 @@
+"""Everything that facesynth knows about a movement, in one numpy archive without pickles."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from facesynth.atomic import atomic_path
+from facesynth.errors import FacesynthError
+from facesynth.face.animation import FaceAnimation
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+
+_ANIMATION = ("names", "weights", "head", "gaze", "tongue_up", "fps")
+
+
+def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None = None) -> None:
+    """Write the animation, and beside it the motion it was made from, each at its own rate.
+
+    Keys: names, weights, head, gaze, tongue_up, fps, residual_mm; frames, frames_fps, frames_head,
+    frames_eyes and layout (JSON text) of the motion.
+    """
+    arrays: dict[str, np.ndarray] = {"names": np.array(animation.names), "weights": animation.weights, "head": animation.head}
+    arrays |= {"gaze": animation.gaze, "tongue_up": animation.tongue_up, "fps": np.array(animation.fps)}
+    if animation.residual_mm is not None:
+        arrays["residual_mm"] = animation.residual_mm
+    if motion is not None:
+        arrays |= {"frames": motion.frames, "frames_fps": np.array(motion.fps)}
+        arrays["layout"] = np.array(json.dumps(motion.layout.to_dict(), sort_keys=True))
+        for name in ("head", "eyes"):
+            if getattr(motion, name) is not None:
+                arrays[f"frames_{name}"] = getattr(motion, name)
+    with atomic_path(path) as part, part.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+
+
+def read_npz(path: str | Path) -> tuple[FaceAnimation, Motion | None]:
+    """Read what `write_npz` wrote; the motion is None where the file has none."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+        raise FacesynthError(f"{path} is no npz file of facesynth, or is truncated ({error})") from None
+    missing = [name for name in _ANIMATION if name not in arrays]
+    if missing:
+        raise FacesynthError(f"{path} has no {', '.join(missing)}; it was not written by facesynth")
+    names = tuple(str(name) for name in np.atleast_1d(arrays["names"]))
+    animation = FaceAnimation(
+        names,
+        arrays["weights"],
+        arrays["head"],
+        arrays["gaze"],
+        arrays["tongue_up"],
+        float(arrays["fps"]),
+        arrays.get("residual_mm"),
+    )
+    return animation, _motion(arrays) if "frames" in arrays else None
+
+
+def _motion(arrays: dict[str, np.ndarray]) -> Motion:
+    layout = Layout.from_dict(json.loads(str(arrays["layout"])))
+    return Motion(arrays["frames"], float(arrays["frames_fps"]), layout, arrays.get("frames_head"), arrays.get("frames_eyes"))
