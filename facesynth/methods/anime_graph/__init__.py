@@ -1,0 +1,1 @@
+"""Cao, Tien, Faloutsos, Pighin: Expressive Speech-Driven Facial Animation (2005)."""

@@ -1,0 +1,92 @@
+"""The anime graph: one node per recorded phone, an edge from each to the one recorded after it (Cao 2005, §4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from facesynth.speech.phones import PHONES, viseme_of
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+VISEMES = np.array([viseme_of(phone) for phone in PHONES])
+PHONE_INDEX: Mapping[str, int] = {phone: index for index, phone in enumerate(PHONES)}
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """N nodes as a struct of arrays. Node n moves through `frames[starts[n]:stops[n]]` (eq. 1: P, C, M, E)."""
+
+    frames: Floats
+    """[F, D] components of all runs, one after the other; a run is a stretch of linked nodes."""
+    features: Floats
+    """[G, P] audio features of the same."""
+    phones: Ints
+    """[N] index into PHONES."""
+    emotions: Ints
+    """[N] index into the corpus' emotions."""
+    starts: Ints
+    stops: Ints
+    feature_starts: Ints
+    feature_stops: Ints
+    run_starts: Ints
+    """[N] first frame of the run that the node belongs to."""
+    run_stops: Ints
+    """[N] one past the run's last frame."""
+    before: Ints
+    """[N] the node recorded just before, or -1."""
+    after: Ints
+    """[N] the node recorded just after, or -1."""
+    utterances: Ints
+    """[N] which utterance the node was recorded in."""
+    numbers: Ints
+    """[N] which of its phones it is."""
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def motion(self, node: int) -> Floats:
+        """[L, D] what the node captured."""
+        return self.frames[self.starts[node] : self.stops[node]]
+
+    def audio(self, node: int) -> Floats:
+        """[L', P] what the node sounded like."""
+        return self.features[self.feature_starts[node] : self.feature_stops[node]]
+
+    def following(self, node: int, count: int) -> Floats:
+        """[up to count, D] the frames recorded after the node."""
+        stop = self.stops[node]
+        return self.frames[stop : min(stop + count, self.run_stops[node])]
+
+    def preceding(self, node: int, count: int) -> Floats:
+        """[up to count, D] the frames recorded before the node."""
+        start = self.starts[node]
+        return self.frames[max(start - count, self.run_starts[node]) : start]
+
+    def of_phone(self, phone: int) -> Ints:
+        """Nodes of a phone."""
+        return np.flatnonzero(self.phones == phone)
+
+    def of_viseme(self, phone: int) -> Ints:
+        """Nodes of the phones that look like this one."""
+        return np.flatnonzero(VISEMES[self.phones] == VISEMES[phone])
+
+    def tensors(self) -> dict[str, torch.Tensor]:
+        """The arrays by name, to be stored; frames and features in single precision."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        kinds = {name: np.float32 if array.dtype == np.float64 else np.int32 for name, array in arrays.items()}
+        return {name: torch.from_numpy(np.ascontiguousarray(array, kinds[name])) for name, array in arrays.items()}
+
+    @classmethod
+    def from_tensors(cls, tensors: Mapping[str, torch.Tensor]) -> Self:
+        """The inverse of `tensors`."""
+        arrays: dict[str, NDArray[Any]] = {f.name: tensors[f.name].cpu().numpy() for f in fields(cls)}
+        kinds = {name: np.float64 if array.dtype == np.float32 else np.int64 for name, array in arrays.items()}
+        columns: dict[str, Any] = {name: array.astype(kinds[name]) for name, array in arrays.items()}
+        return cls(**columns)

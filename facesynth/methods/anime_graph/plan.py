@@ -1,0 +1,137 @@
+"""From speech to a path through the graph, with an account of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.methods.anime_graph.assembly import Blender, Piece, warped
+from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
+from facesynth.methods.anime_graph.search import Step, Weights, best_path, jumps, look_ahead_path, path_cost
+from facesynth.speech.phones import PHONES
+
+
+@dataclass(frozen=True, eq=False)
+class Wish:
+    """What one phone of the input asks for."""
+
+    phone: int
+    emotion: int
+    wanted: NDArray[np.float64]
+    """[m, P] audio features."""
+    frames: int
+    """Length of the phone in the output."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A path through the graph for T phones."""
+
+    wishes: Sequence[Wish]
+    candidates: Sequence[Candidates]
+    steps: Sequence[Step]
+    path: NDArray[np.int64]
+    """[T] index of the chosen one among each phone's candidates."""
+    cost: float
+    """Eq. 2."""
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        """[T] the chosen nodes."""
+        return np.array([c.nodes[i] for c, i in zip(self.candidates, self.path, strict=True)])
+
+    @property
+    def jumps(self) -> NDArray[np.bool_]:
+        """[T - 1] whether the step after each phone is a jump."""
+        return jumps(self.steps, self.path)
+
+    def summary(self) -> dict[str, Any]:
+        """Counts: phones, jumps, fallbacks of phone and of emotion; and the cost."""
+        phone_levels = Counter(c.phone_level for c in self.candidates)
+        emotion_levels = Counter(c.emotion_level for c in self.candidates)
+        return {
+            "phones": len(self.path),
+            "jumps": int(self.jumps.sum()),
+            "cost": self.cost,
+            "phone_fallbacks": {k: v for k, v in phone_levels.items() if k != "phone"},
+            "emotion_fallbacks": {k: v for k, v in emotion_levels.items() if k != "emotion"},
+        }
+
+
+def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float64]) -> tuple[list[Candidates], list[Step]]:
+    """Candidates and their costs for each phone."""
+    candidates = [chooser.candidates(wish.phone, wish.emotion) for wish in wishes]
+    before = [None, *candidates[:-1]]
+    steps = [make_step(chooser, c, b, w.wanted, metric) for c, b, w in zip(candidates, before, wishes, strict=True)]
+    return candidates, steps
+
+
+def make_plan(
+    chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float64], weights: Weights, look_ahead: int | None
+) -> Plan:
+    """The globally best path, or the one that a look-ahead of some phones finds."""
+    candidates, steps = lay_steps(chooser, wishes, metric)
+    if look_ahead is None:
+        path, cost = best_path(steps, weights)
+    else:
+        path = look_ahead_path(steps, weights, look_ahead)
+        cost = path_cost(steps, path, weights)
+    return Plan(wishes, candidates, steps, path, cost)
+
+
+def make_piece(chooser: Chooser, wish: Wish, candidates: Candidates, chosen: int) -> Piece:
+    """The chosen node, time-warped to the phone."""
+    node, number = int(candidates.nodes[chosen]), int(candidates.maps[chosen])
+    motion = warped(chooser.motion(node, number), wish.wanted, chooser.graph.audio(node), wish.frames)
+    return Piece(wish.phone, wish.emotion, node, number, wish.wanted, motion)
+
+
+def blend(chooser: Chooser, plan: Plan, fps: float) -> tuple[NDArray[np.float64], Blender]:
+    """[frames, D] blended motion of a plan, not yet smoothed, and what became of its jumps."""
+    blender = Blender(chooser, fps)
+    captured = [False, *(~plan.jumps).tolist()]
+    for wish, candidates, chosen, recorded in zip(plan.wishes, plan.candidates, plan.path, captured, strict=True):
+        blender.add(make_piece(chooser, wish, candidates, int(chosen)), recorded)
+    return np.concatenate([blender.blended(t) for t in range(len(blender.pieces))]), blender
+
+
+def explain(
+    chooser: Chooser, plan: Plan, weights: Weights, names: Sequence[str], emotions: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Per phone: the chosen node, its cost terms, the runners-up by audio, and whether phone and emotion are right."""
+    graph, rows = chooser.graph, []
+    for t, (wish, node) in enumerate(zip(plan.wishes, plan.nodes, strict=True)):
+        step, chosen = plan.steps[t], plan.path[t]
+        jumped = t > 0 and bool(plan.jumps[t - 1])
+        apart = np.linalg.norm(plan.steps[t - 1].last[plan.path[t - 1]] - step.first[chosen]) if jumped else 0.0
+        nearest = np.argsort(step.audio, kind="stable")[:4]
+        rows.append(
+            {
+                "phone": PHONES[wish.phone],
+                "emotion": emotions[wish.emotion],
+                "node": node_label(names, graph.utterances[node], graph.numbers[node]),
+                "jump": weights.jump * jumped,
+                "jump_cost": weights.jump_cost * float(apart),
+                "audio_cost": weights.audio * float(step.audio[chosen]),
+                "right_phone": bool(graph.phones[node] == wish.phone),
+                "right_viseme": plan.candidates[t].phone_level != "any phone",
+                "right_emotion": bool(graph.emotions[node] == wish.emotion),
+                "mapped": bool(plan.candidates[t].maps[chosen] >= 0),
+                "nearest_by_audio": [
+                    node_label(names, graph.utterances[n], graph.numbers[n])
+                    for n in plan.candidates[t].nodes[nearest]
+                    if n != node
+                ][:3],
+            }
+        )
+    return rows
+
+
+def node_label(names: Sequence[str], utterance: int, number: int) -> str:
+    """`utterance_id:phone_number`, which stays the same when a graph is built again."""
+    return f"{names[utterance]}:{number}"

@@ -1,0 +1,171 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from corpora import tiny_corpus
+
+from facesynth.errors import FacesynthError
+from facesynth.methods.anime_graph.lowpass import energy_spectrum
+from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.anime_graph.plan import blend
+from facesynth.speech.phones import PHONES
+from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("anime") / "corpus", utterances=24)
+
+
+@pytest.fixture(scope="module")
+def model(corpus):
+    return AnimeGraph().fit(corpus)
+
+
+@pytest.fixture(scope="module")
+def unseen(corpus):
+    """A model of some sentences, and an utterance of another."""
+    train, test = corpus.split()
+    return AnimeGraph().fit(train), next(iter(test))
+
+
+def said(utterance, **changes):
+    return dataclasses.replace(utterance.speech, **changes)
+
+
+def test_every_phone_is_a_node_linked_to_the_next(corpus, model):
+    graph = model.graph
+    assert len(graph) == sum(len(u.speech.phones) for u in corpus)
+    first = next(iter(corpus))
+    nodes = np.flatnonzero(graph.utterances == 0)
+    assert [PHONES[p] for p in graph.phones[nodes]] == list(first.speech.phones.labels)
+    np.testing.assert_array_equal(graph.after[nodes[:-1]], nodes[1:])
+    np.testing.assert_array_equal(graph.before[nodes[1:]], nodes[:-1])
+    assert graph.after[nodes[-1]] == graph.before[nodes[0]] == -1
+
+
+def test_a_recorded_sentence_returns_itself_without_a_jump(corpus, model):
+    for utterance in list(corpus)[:4]:
+        plan = model.plan(utterance.speech)
+        assert plan.cost == 0
+        assert not plan.jumps.any()
+        motion, _ = blend(model.chooser, plan, model.fps)
+        np.testing.assert_allclose(motion, model.components.encode_array(utterance.motion.frames), atol=1e-4)
+
+
+def test_output_is_as_long_as_the_phones_and_close_to_the_recording(unseen):
+    model, utterance = unseen
+    motion = model.synthesize(utterance.speech)
+    assert motion.frames.shape == utterance.motion.frames.shape
+    error = np.linalg.norm(motion.points - utterance.motion.points, axis=-1).mean()
+    still = np.linalg.norm(utterance.motion.points - utterance.motion.points.mean(axis=0), axis=-1).mean()
+    assert error < 1.5 * still
+
+
+def test_save_and_load_give_the_same_bytes(unseen, tmp_path):
+    model, utterance = unseen
+    model.save(tmp_path / "model.safetensors")
+    again = AnimeGraph.load(tmp_path / "model.safetensors")
+    first, second = (m.synthesize(utterance.speech).frames for m in (model, again))
+    assert first.tobytes() == second.tobytes()
+
+
+def test_what_smoothing_leaves_lies_below_the_cutoffs(unseen, corpus):
+    model, utterance = unseen
+    smooth = model.components.encode_array(model.synthesize(utterance.speech).frames)
+    frequencies, energy = energy_spectrum([smooth], model.fps)
+    for column, cutoff in enumerate(model.cutoffs_hz.numpy()):
+        assert energy[frequencies > cutoff, column].sum() <= 0.01 * energy[:, column].sum()
+    captured = model.components.encode_array(utterance.motion.frames)
+    frequencies, energy = energy_spectrum([captured], model.fps)
+    assert model.cutoffs_hz.shape == (captured.shape[1],)
+
+
+def test_look_ahead_costs_as_much_or_more(unseen):
+    model, utterance = unseen
+    best = model.plan(utterance.speech).cost
+    costs = [model.plan(utterance.speech, look_ahead=phones).cost for phones in (1, 3, 6, 40)]
+    assert min(costs) >= best * (1 - 1e-12)
+    assert costs[-1] == pytest.approx(best)
+
+
+def test_stream_gives_the_motion_of_the_look_ahead(unseen):
+    model, utterance = unseen
+    pieces = list(model.stream(model.wishes(utterance.speech), look_ahead=3))
+    assert sum(len(piece) > 0 for piece in pieces) > 4
+    whole = model.synthesize(utterance.speech, look_ahead=3).frames
+    streamed = np.concatenate(pieces)
+    assert streamed.shape == whole.shape
+    assert np.abs(streamed - whole).max() < 0.3
+
+
+def test_emotion_chooses_the_candidates(model, corpus):
+    utterance = next(iter(corpus))
+    sad = said(utterance, emotions=EmotionTrack.constant("sad", utterance.speech.duration_s))
+    nodes = model.plan(sad).nodes
+    levels = [c.emotion_level for c in model.plan(sad).candidates]
+    for node, level in zip(nodes, levels, strict=True):
+        assert level != "emotion" or model.emotions[model.graph.emotions[node]] == "sad"
+    assert "emotion" in levels
+
+
+def test_a_phone_that_the_graph_lacks_is_expressed_by_its_class(model, corpus):
+    utterance = next(iter(corpus))
+    phones = utterance.speech.phones
+    labels = ("zh", "ng", *phones.labels[2:])
+    plan = model.plan(said(utterance, phones=PhoneTrack(labels, phones.ends_s)))
+    assert plan.summary()["phone_fallbacks"]["viseme"] == 2
+    assert PHONES[model.graph.phones[plan.nodes[0]]] == "s"
+    strange = said(utterance, phones=PhoneTrack(("hh", *phones.labels[1:]), phones.ends_s))
+    assert model.plan(strange).summary()["phone_fallbacks"] == {"any phone": 1}
+
+
+def test_incomplete_phones_and_removed_nodes_break_the_run(tmp_path):
+    corpus = tiny_corpus(tmp_path / "corpus", utterances=3)
+    name = corpus.ids[0]
+    corpus.remove_node(f"{name}:3")
+    path = corpus.files.motion(name)
+    with np.load(path, allow_pickle=False) as file:
+        arrays = dict(file)
+    bounds = corpus[name].speech.phones.frame_bounds(corpus.fps)
+    arrays["frames"][bounds[6] : bounds[8], :3] = np.nan
+    np.savez(path, **arrays)
+    graph = AnimeGraph().fit(corpus).graph
+    numbers = graph.numbers[graph.utterances == 0].tolist()
+    assert not {3, 6, 7} & set(numbers)
+    node = int(np.flatnonzero((graph.utterances == 0) & (graph.numbers == 2))[0])
+    assert graph.after[node] == -1
+    assert graph.run_stops[node] == graph.stops[node]
+    assert np.isfinite(graph.frames).all()
+
+
+def test_explains_every_phone(unseen):
+    model, utterance = unseen
+    rows = model.explain(utterance.speech)
+    assert len(rows) == len(utterance.speech.phones)
+    assert sum(r["jump"] + r["jump_cost"] + r["audio_cost"] for r in rows) == pytest.approx(model.plan(utterance.speech).cost)
+    assert all(":" in r["node"] for r in rows)
+
+
+def test_bad_speech_is_one_clear_line(model, corpus):
+    utterance = next(iter(corpus))
+    length = utterance.speech.duration_s
+    with pytest.raises(FacesynthError, match="unknown emotion 'bored'"):
+        model.synthesize(said(utterance, emotions=EmotionTrack.constant("bored", length)))
+    with pytest.raises(FacesynthError, match="constant"):
+        model.synthesize(said(utterance, audio=np.full(16000, 0.3)))
+    with pytest.raises(FacesynthError, match="unknown phone"):
+        model.synthesize(Speech(np.ones(10), 16000, PhoneTrack(("xx",), np.array([1.0])), EmotionTrack.constant("sad", 1.0)))
+    with pytest.raises(FacesynthError, match="not trained"):
+        AnimeGraph().synthesize(utterance.speech)
+
+
+def test_nothing_that_moves_is_refused(tmp_path):
+    corpus = tiny_corpus(tmp_path / "corpus", utterances=1)
+    path = corpus.files.motion(corpus.ids[0])
+    with np.load(path, allow_pickle=False) as file:
+        arrays = dict(file)
+    arrays["frames"][:] = arrays["frames"][:1]
+    np.savez(path, **arrays)
+    with pytest.raises(FacesynthError, match="nothing moves"):
+        AnimeGraph().fit(corpus)
