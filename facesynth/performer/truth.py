@@ -1,0 +1,45 @@
+"""What is wrong with the built-in performer's recordings, written down, so that finding it can be tested."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from facesynth.atomic import write_text
+from facesynth.errors import FacesynthError
+from facesynth.performer.capture import Fault
+
+FILE = "performer_truth.json"
+
+
+def read_truth(corpus_path: str | Path) -> dict[str, tuple[Fault, ...]]:
+    """Faults by utterance id; utterances without one are there with none."""
+    path = Path(corpus_path) / FILE
+    if not path.is_file():
+        raise FacesynthError(f"{path} is missing; only corpora of the built-in performer have one")
+    try:
+        plain: dict[str, list[dict[str, Any]]] = json.loads(path.read_text(encoding="utf-8"))
+        return {utterance: tuple(_fault(fault) for fault in faults) for utterance, faults in plain.items()}
+    except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
+        raise FacesynthError(f"{path} is damaged ({error}); delete the folder and build the performer again") from None
+
+
+def write_truth(corpus_path: str | Path, truth: Mapping[str, Sequence[Fault]]) -> None:
+    """Write all faults, by utterance id, atomically."""
+    lines = [
+        f"{json.dumps(utterance)}: {json.dumps([fault.to_dict() for fault in truth[utterance]])}" for utterance in sorted(truth)
+    ]
+    write_text(Path(corpus_path) / FILE, "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def contaminated_nodes(truth: Mapping[str, Sequence[Fault]]) -> frozenset[str]:
+    """Names of the nodes (`utterance_id:phone_number`) whose markers were confused or knocked."""
+    return frozenset(
+        f"{utterance}:{fault.phone}" for utterance, faults in truth.items() for fault in faults if fault.phone is not None
+    )
+
+
+def _fault(plain: Mapping[str, Any]) -> Fault:
+    return Fault(plain["kind"], tuple(plain["markers"]), plain["start"], plain["stop"], plain["phone"])
