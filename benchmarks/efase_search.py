@@ -95,7 +95,10 @@ def against_dense(nodes, query, weights):
     print(f"N = {len(nodes)}, T = {len(query)}, PNT = {weights.pnt:.4g}; share of phi computed {found.evaluated:.2%}")
     print(f"  dense: transition matrix {matrix_s:.2f} s + blocked min-plus {dense_s:.2f} s")
     print(f"  (a) from nothing {from_nothing_s:.3f} s: {(matrix_s + dense_s) / from_nothing_s:.1f} x faster")
-    print(f"  (b) tables kept, {index.bytes / 1e6:.1f} MB, {prepared_s:.3f} s: {dense_s / prepared_s:.1f} x faster than min-plus alone")
+    print(
+        f"  (b) tables kept, {index.bytes / 1e6:.1f} MB, {prepared_s:.3f} s: "
+        f"{dense_s / prepared_s:.1f} x faster than min-plus alone"
+    )
     in_float64 = path_cost(nodes, query, dense.nodes, weights)
     print(f"  cost {found.cost:.6g}, of the dense path {in_float64:.6g}, relative difference {in_float64 / found.cost - 1:.1e}")
     for year, seconds in (("2008", PAPER_2008_S), ("2006", PAPER_2006_S)):

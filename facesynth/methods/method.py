@@ -56,8 +56,11 @@ class Method(nn.Module):
         """Learn from a corpus; returns self."""
         raise NotImplementedError
 
-    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
-        """Motion for new speech, as long as its phone track, at the rate the method learned."""
+    def synthesize(self, speech: Speech, *, seed: int = 0) -> Motion:
+        """Motion for new speech, as long as its phone track, at the rate the method learned.
+
+        A method adds options of its own as keywords.
+        """
         raise NotImplementedError
 
     @property
@@ -117,7 +120,10 @@ def read_header(path: str | Path) -> dict[str, Any]:
         raise FacesynthError(f"{path} is not a facesynth model, or is truncated ({error})") from None
     if text is None:
         raise FacesynthError(f"{path} is a safetensors file without a facesynth header; it was not written by facesynth")
-    header: dict[str, Any] = json.loads(text)
+    try:
+        header: dict[str, Any] = json.loads(text)
+    except ValueError:
+        raise FacesynthError(f"{path} has a damaged facesynth header; train the model again") from None
     if header.get("format") != FORMAT:
         raise FacesynthError(f"{path} has model format {header.get('format')}; this facesynth reads {FORMAT}: train it again")
     return header

@@ -10,7 +10,15 @@ from typing import Any
 from facesynth.errors import unknown
 from facesynth.methods.method import Method, read_header
 
-_MODULES = {"efase": "facesynth.methods.efase.method"}
+_MODULES = {
+    "efase": "facesynth.methods.efase.method",
+    "anime_graph": "facesynth.methods.anime_graph.method",
+    "lds": "facesynth.methods.lds.method",
+    "mean_face": "facesynth.methods.baselines.mean_face",
+    "phone_mean": "facesynth.methods.baselines.phone_mean",
+    "ridge": "facesynth.methods.baselines.ridge",
+    "tcn": "facesynth.methods.baselines.tcn",
+}
 _CLASSES: dict[str, type[Method]] = {}
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -120,5 +121,5 @@ def transition_cost(nodes: MotionNodes, i: int, j: int, weights: Weights) -> flo
 def path_cost(nodes: MotionNodes, query: Query, path: Ints, weights: Weights) -> float:
     """The whole COST of one path [T]."""
     targets = sum(target_costs(nodes, query, t, weights)[node] for t, node in enumerate(path))
-    steps = sum(transition_cost(nodes, int(i), int(j), weights) for i, j in zip(path[:-1], path[1:], strict=True))
+    steps = sum(transition_cost(nodes, int(i), int(j), weights) for i, j in pairwise(path))
     return float(targets + steps)

@@ -50,7 +50,7 @@ def dense_search(nodes: MotionNodes, query: Query, weights: Weights, transitions
     ]
     phi, back = targets[0], []
     for target in targets[1:]:
-        blocks = [(rows + phi).min(dim=1) for rows in transitions.split(BLOCK)]
+        blocks = [(rows + phi).min(dim=1) for rows in torch.split(transitions, BLOCK)]
         back.append(torch.cat([block.indices for block in blocks]))
         phi = torch.cat([block.values for block in blocks]) + target
     path = [int(phi.argmin())]

@@ -75,6 +75,7 @@ class SearchIndex:
     tables: Tables
     tree_phones: Ints
     tree_emotions: Ints
+    forest: Forest
     nodes: MotionNodes
     weights: Weights
 
@@ -95,15 +96,18 @@ class Path:
     """Share of the (phone, node) pairs whose phi was computed."""
 
 
-def build_index(nodes: MotionNodes, weights: Weights) -> SearchIndex:
-    """Grow the forest and put everything in its order. O(N log N) time, O(N) memory."""
+def build_index(nodes: MotionNodes, weights: Weights, forest: Forest | None = None, nearest: Floats | None = None) -> SearchIndex:
+    """Grow the forest, unless a kept one is given, and put everything in its order. O(N) memory."""
     key = nodes.phones * (int(nodes.emotions.max()) + 1) + nodes.emotions
     _, first, tree_of = np.unique(key, return_index=True, return_inverse=True)
     ends = end_vectors(nodes, weights)
-    forest = grow_forest(ends, tree_of)
+    forest = forest or grow_forest(ends, tree_of)
     tables = _tables(nodes, weights, forest, ends, nodes.visemes[first])
-    _find_nearest(tables, weights.beta)
-    return SearchIndex(tables, nodes.phones[first], nodes.emotions[first], nodes, weights)
+    if nearest is None:
+        _find_nearest(tables, weights.beta)
+    else:
+        tables.nearest[:] = nearest
+    return SearchIndex(tables, nodes.phones[first], nodes.emotions[first], forest, nodes, weights)
 
 
 def search(index: SearchIndex, query: Query) -> Path:
@@ -249,7 +253,7 @@ def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignor
         for row in range(tables.ball_starts[root], tables.ball_stops[root]):
             if state.phi[t, row] > state.least[t] * MARGIN or state.phi[t, row] == np.inf:
                 continue
-            _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha)
+            _evaluate(t, row, tables, state, targets, beta, pnt)
             phi, best = state.phi[t, row], state.least[t]
             if phi < best or (phi == best and tables.node[row] < tables.node[state.least_at[t]]):
                 state.least[t], state.least_at[t] = phi, row
@@ -289,12 +293,12 @@ def _bound_balls(t, tables, state):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+def _evaluate(t, row, tables, state, targets, beta, pnt):  # type: ignore[no-untyped-def]
     """phi of one row; whatever unknown phi of earlier positions it asks for is computed first."""
     stack = [row]
-    while len(stack):
+    while len(stack) > 0:
         at = t - len(stack) + 1
-        asked = _predecessor(at, stack[-1], tables, state, targets, fixed, beta, pnt, alpha)
+        asked = _predecessor(at, stack[-1], tables, state, targets, beta, pnt)
         if asked < 0:
             stack.pop()
         else:
@@ -302,7 +306,7 @@ def _evaluate(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type:
 
 
 @njit(cache=True)
-def _predecessor(t, row, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+def _predecessor(t, row, tables, state, targets, beta, pnt):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - one search loop
     """Set phi and back of one row and return -1, or return a row of position t - 1 that must be known first."""
     target = targets[t, tables.tree_of[row]]
     captured = tables.before[row]

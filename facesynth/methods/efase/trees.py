@@ -39,8 +39,6 @@ class Forest:
     """[C + 1] first ball of each tree and, last, B."""
     tree_of: Ints
     """[N] the tree of each member."""
-    balls_of_leaf: Ints
-    """[N] the leaf of each member."""
 
 
 def grow_forest(vectors: Floats, tree_of: Ints) -> Forest:
@@ -54,8 +52,8 @@ def grow_forest(vectors: Floats, tree_of: Ints) -> Forest:
     capacity = 4 * (len(order) // LEAF + classes) + 4
     starts, stops, left, right, roots, count = _split_all(vectors, order, bounds, capacity)
     starts, stops, left, right = starts[:count], stops[:count], left[:count], right[:count]
-    centres, radii, leaves = _enclose(vectors, order, starts, stops, left)
-    return Forest(order, starts, stops, left, right, centres, radii, roots, tree_of.astype(np.int64), leaves)
+    centres, radii = _enclose(vectors, order, starts, stops)
+    return Forest(order, starts, stops, left, right, centres, radii, roots, tree_of.astype(np.int64))
 
 
 @njit(cache=True)
@@ -98,10 +96,9 @@ def _widest(vectors, members):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _enclose(vectors, order, starts, stops, left):  # type: ignore[no-untyped-def]
+def _enclose(vectors, order, starts, stops):  # type: ignore[no-untyped-def]
     balls, width = len(starts), vectors.shape[1]
     centres, radii = np.zeros((balls, width)), np.zeros(balls)
-    leaves = np.empty(len(order), np.int64)
     for ball in range(balls):
         members = order[starts[ball] : stops[ball]]
         for m in members:
@@ -112,7 +109,5 @@ def _enclose(vectors, order, starts, stops, left):  # type: ignore[no-untyped-de
             for v in range(width):
                 distance += (vectors[m, v] - centres[ball, v]) ** 2
             radii[ball] = max(radii[ball], distance)
-            if left[ball] < 0:
-                leaves[m] = ball
         radii[ball] = np.sqrt(radii[ball])
-    return centres, radii, leaves
+    return centres, radii

@@ -1,0 +1,114 @@
+"""From a path of nodes to frames: stretching, joining, smoothing, and what the face does in silence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
+from facesynth.motion.smoothing import smooth_joint
+from facesynth.motion.warp import time_warp
+
+FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
+"""Phones whose shape must survive the smoothing (Deng 2008, §6.3)."""
+LOOSE = frozenset(["k", "g", "ch", "ng", "r"])
+SETTLE_S = 0.25
+"""How long the face takes to its rest pose."""
+WAKE_S = 0.2
+"""How long before speech it leaves that pose."""
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How joints are smoothed."""
+
+    firm: float = 2.0
+    loose: float = 0.5
+    reach_s: float = 0.025
+    """Frames on either side of a joint, at least three."""
+    stiffness: float = 1.0
+    """Weight of the bending term at 120 Hz."""
+
+
+def concatenate(
+    nodes: MotionNodes, path: Ints, phones: tuple[str, ...], bounds: Ints, rest: Floats, fps: float, smoothing: Smoothing
+) -> Floats:
+    """Frames [T, D] of one search result.
+
+    path [P] a node for each phone (ignored where it is `pau`), bounds [P + 1] first frames of the
+    phones, rest [P, D] the rest pose at each phone.
+    """
+    frames = np.zeros((bounds[-1], nodes.frames.shape[1]))
+    spoken = np.array([phone != "pau" for phone in phones])
+    for node, speaks, start, stop in zip(path, spoken, bounds[:-1], bounds[1:], strict=True):
+        if speaks and stop > start:
+            frames[start:stop] = time_warp(nodes.motion(int(node)), int(stop - start))
+    frames = _smooth_joints(frames, nodes, path, phones, spoken, bounds, fps, smoothing)
+    for first, stop in _runs(~spoken):
+        _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
+    return frames
+
+
+def joints(nodes: MotionNodes, path: Ints, phones: tuple[str, ...], bounds: Ints) -> Ints:
+    """First frames of phones that were not captured right after the phone before them."""
+    jumps = [
+        bounds[t]
+        for t in range(1, len(path))
+        if phones[t] != "pau" and phones[t - 1] != "pau" and nodes.before[path[t]] != path[t - 1]
+    ]
+    return np.array(jumps, np.int64)
+
+
+def _smooth_joints(
+    frames: Floats,
+    nodes: MotionNodes,
+    path: Ints,
+    phones: tuple[str, ...],
+    spoken: np.ndarray,
+    bounds: Ints,
+    fps: float,
+    smoothing: Smoothing,
+) -> Floats:
+    weight = {**dict.fromkeys(FIRM, smoothing.firm), **dict.fromkeys(LOOSE, smoothing.loose)}
+    weights = np.repeat([weight.get(phone, 1.0) for phone in phones], np.diff(bounds))
+    reach = max(3, round(smoothing.reach_s * fps))
+    stiffness = smoothing.stiffness * (fps / 120) ** 3
+    for joint in joints(nodes, path, phones, bounds):
+        t = int(np.searchsorted(bounds, joint, side="right")) - 1
+        inside = min(reach, int(bounds[t] - bounds[t - 1]), int(bounds[t + 1] - bounds[t]))
+        if inside > 0:
+            frames = smooth_joint(frames, int(joint), inside, weights, stiffness)
+    return frames
+
+
+def _runs(silent: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: float) -> None:
+    """Between words a short silence is bridged; a long one, or one at an edge, goes through the rest pose.
+
+    Everything follows 3u² - 2u³, which starts and ends without velocity.
+    """
+    settle, wake = round(SETTLE_S * fps), round(WAKE_S * fps)
+    at_start, at_end = start == 0, stop == len(frames)
+    if stop <= start:
+        return
+    before = rest if at_start else frames[start - 1]
+    after = rest if at_end else frames[stop]
+    count = stop - start
+    k = np.arange(1, count + 1)[:, None]
+    if at_start or at_end or count > settle + wake:
+        leave = np.zeros_like(k, float) if at_end else _ease((k - (count + 1 - wake)) / wake)
+        arrive = np.ones_like(k, float) if at_start else _ease(k / settle)
+        frames[start:stop] = (1 - leave) * ((1 - arrive) * before + arrive * rest) + leave * after
+    else:
+        share = _ease(k / (count + 1))
+        frames[start:stop] = (1 - share) * before + share * after
+
+
+def _ease(u: Floats) -> Floats:
+    u = np.clip(u, 0, 1)
+    return u * u * (3 - 2 * u)

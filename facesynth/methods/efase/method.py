@@ -1,0 +1,243 @@
+"""eFASE as a method of the zoo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
+from facesynth.methods.efase.costs import Query, Weights
+from facesynth.methods.efase.database import build_database
+from facesynth.methods.efase.dense import dense_search, transition_matrix
+from facesynth.methods.efase.explanation import explain, shares
+from facesynth.methods.efase.intensity import blend, close_lips
+from facesynth.methods.efase.nodes import Floats, MotionNodes
+from facesynth.methods.efase.penalty import median_transition
+from facesynth.methods.efase.search import Path, SearchIndex, build_index, search
+from facesynth.methods.efase.trees import Forest
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.motion.motion import Motion
+from facesynth.motion.pca import Pca
+from facesynth.motion.resample import resample
+from facesynth.speech.phones import PHONES, SILENCE, viseme_of
+from facesynth.speech.speech import Speech
+
+NODE_FIELDS = ("starts", "stops", "phones", "visemes", "emotions", "before", "after")
+FOREST_FIELDS = ("order", "starts", "stops", "left", "right", "centres", "radii", "roots", "tree_of")
+NEUTRAL = "neutral"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The result of a search, before it becomes motion."""
+
+    query: Query
+    path: Path
+
+
+@register("efase")
+class Efase(Method):
+    """Constrained dynamic programming over captured motion nodes (Deng & Neumann 2008).
+
+    The weights alpha … phi are those of the cost (see `Weights`); `penalty` is PNT as a multiple of
+    the median rule-2 transition of the database; `database_fps` the rate at which nodes are cut.
+    """
+
+    pca: Pca
+    node_frames: Tensor
+    """[F, D] frames of all nodes."""
+    node_table: Tensor
+    """[7, N] the columns NODE_FIELDS of the nodes."""
+    rest: Tensor
+    """[E, D] rest pose in each emotion."""
+    nearest: Tensor
+    """[N] see `Tables.nearest`."""
+
+    def __init__(
+        self,
+        components: float = 25,
+        database_fps: float = 120.0,
+        penalty: float = 10.0,
+        alpha: float = 3.6052,
+        beta: float = 5.7814,
+        eta: float = 6.8282,
+        gamma: float = 0.2903,
+        delta: float = 0.315,
+        phi: float = 0.109,
+        smoothing_firm: float = 2.0,
+        smoothing_loose: float = 0.5,
+        smoothing_s: float = 0.025,
+        smoothing_stiffness: float = 1.0,
+    ) -> None:
+        super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
+        self.smoothing = Smoothing(smoothing_firm, smoothing_loose, smoothing_s, smoothing_stiffness)
+        self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
+        self._index: SearchIndex | None = None
+        self._transitions: Tensor | None = None
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
+        self.learned_from(corpus)
+        database = build_database(corpus, self.config["database_fps"], self.config["components"])
+        nodes = database.nodes
+        self.pca = database.pca
+        self.facts = {"names": list(database.names), "unusable_phones": database.unusable}
+        self.register_buffer("node_frames", torch.from_numpy(nodes.frames.astype(np.float32)))
+        self.register_buffer("node_table", torch.from_numpy(np.stack([getattr(nodes, f) for f in NODE_FIELDS])))
+        self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
+        self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
+        self._keep_index()
+        return self
+
+    @classmethod
+    def load(cls, path: Any) -> Self:
+        """See `Method.load`."""
+        method = super().load(path)
+        count = method.node_table.shape[1] if hasattr(method, "node_table") else -1
+        if count != len(method.facts.get("names", [])):
+            raise FacesynthError(f"{path} lists {len(method.facts.get('names', []))} nodes but holds {count}; train it again")
+        return method
+
+    def weights(self) -> Weights:
+        """The cost's parameters, PNT in the units of this database."""
+        names = ("alpha", "beta", "eta", "gamma", "delta", "phi")
+        pnt = self.config["penalty"] * (self.facts.get("median_transition") or 1.0)
+        return Weights(pnt, **{name: self.config[name] for name in names})
+
+    def nodes(self) -> MotionNodes:
+        """The database."""
+        _ = self.fitted_layout
+        table = self.node_table.cpu().numpy()
+        return MotionNodes(self.node_frames.cpu().numpy().astype(np.float64), *table)
+
+    def index(self) -> SearchIndex:
+        """The prepared search, made from what the model file keeps."""
+        if self._index is None:
+            forest = Forest(
+                **{field: getattr(self, f"forest_{field}").cpu().numpy() for field in FOREST_FIELDS},
+            )
+            self._index = build_index(self.nodes(), self.weights(), forest, self.nearest.cpu().numpy())
+        return self._index
+
+    def plan(self, speech: Speech, *, emotion: str | None = None, constraints: Mapping[int, str] | None = None) -> Plan:
+        """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
+        query = self._query(speech, emotion, constraints or {})
+        if self.node_frames.device.type == "cpu":
+            return Plan(query, search(self.index(), query))
+        nodes, weights = self.nodes(), self.weights()
+        if self._transitions is None:
+            self._transitions = transition_matrix(nodes, weights, str(self.node_frames.device))
+        return Plan(query, dense_search(nodes, query, weights, self._transitions))
+
+    def synthesize(
+        self,
+        speech: Speech,
+        *,
+        seed: int = 0,
+        fps: float | None = None,
+        constraints: Mapping[int, str] | None = None,
+    ) -> Motion:
+        """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name."""
+        _, bounds = self._phones(speech)
+        intensity = speech.emotions.per_phone(speech.phones)[1]
+        frames = self._decode(speech, self.plan(speech, constraints=constraints))
+        if (intensity < 1).any() and NEUTRAL in self.emotions:
+            neutral = self._decode(speech, self.plan(speech, emotion=NEUTRAL, constraints=constraints), NEUTRAL)
+            mixed = blend(neutral, frames, intensity, bounds, self.config["database_fps"])
+            sources, labels = (neutral, frames), speech.phones.labels
+            frames = close_lips(mixed, sources, self.fitted_layout, labels, bounds, self.config["database_fps"])
+        motion = Motion(frames.astype(np.float32), self.config["database_fps"], self.fitted_layout)
+        return _of_length(resample(motion, fps or self.fps), speech)
+
+    def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
+        """Chosen node, cost terms and runners-up for each phone."""
+        plan = self.plan(speech, constraints=constraints)
+        return explain(self.nodes(), self.facts["names"], self.emotions, plan.query, plan.path.nodes, self.weights())
+
+    def report(self, speech: Speech) -> dict[str, float]:
+        """Shares of phones said by another phone, viseme class or emotion."""
+        plan = self.plan(speech)
+        return shares(self.nodes(), plan.query, plan.path.nodes)
+
+    def joint_frames(self, speech: Speech) -> np.ndarray:
+        """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
+        plan = self.plan(speech)
+        labels, bounds = speech.phones.labels, speech.phones.frame_bounds(self.fps)
+        return joints(self.nodes(), plan.path.nodes, labels, bounds)
+
+    def with_weights(self, **weights: float) -> Self:
+        """The same database under other parameters of the cost, sharing its arrays."""
+        other = type(self).from_config({**self.config, **weights})
+        other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
+        other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
+        for name in ("node_frames", "node_table", "rest"):
+            other.register_buffer(name, getattr(self, name))
+        other.facts["median_transition"] = median_transition(other.nodes(), replace(other.weights(), pnt=1.0))
+        other._keep_index()
+        return other
+
+    def _keep_index(self) -> None:
+        self._index = build_index(self.nodes(), self.weights())
+        forest = self._index.forest
+        for field in FOREST_FIELDS:
+            self.register_buffer(f"forest_{field}", torch.from_numpy(getattr(forest, field)))
+        self.register_buffer("nearest", torch.from_numpy(self._index.tables.nearest))
+
+    def _query(self, speech: Speech, emotion: str | None, constraints: Mapping[int, str]) -> Query:
+        labels, _ = self._phones(speech)
+        felt = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
+        return Query(
+            np.array([-1 if label == SILENCE else PHONES.index(label) for label in labels]),
+            np.array([-1 if label == SILENCE else viseme_of(label) for label in labels]),
+            np.array([self._emotion_index(e) for e in felt]),
+            {t: self._node_index(t, name, labels) for t, name in constraints.items()},
+        )
+
+    def _phones(self, speech: Speech) -> tuple[tuple[str, ...], np.ndarray]:
+        for label in speech.phones.labels:
+            viseme_of(label)
+        return speech.phones.labels, speech.phones.frame_bounds(self.config["database_fps"])
+
+    def _emotion_index(self, emotion: str) -> int:
+        if emotion not in self.emotions:
+            raise unknown("emotion", emotion, self.emotions)
+        return self.emotions.index(emotion)
+
+    def _node_index(self, t: int, name: str, labels: Sequence[str]) -> int:
+        if not 0 <= t < len(labels):
+            raise FacesynthError(f"there is no phone {t} to constrain; the input has phones 0 to {len(labels) - 1}")
+        if labels[t] == SILENCE:
+            raise FacesynthError(f"phone {t} is silence, which has no node; constrain a phone that is spoken")
+        names = self.facts["names"]
+        if name not in names:
+            raise unknown("node", name, names)
+        return int(names.index(name))
+
+    def _decode(self, speech: Speech, plan: Plan, emotion: str | None = None) -> Floats:
+        labels, bounds = self._phones(speech)
+        felt = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
+        rest = self.rest.cpu().numpy().astype(np.float64)[[self._emotion_index(e) for e in felt]]
+        fps = self.config["database_fps"]
+        coordinates = concatenate(self.nodes(), plan.path.nodes, labels, bounds, rest, fps, self.smoothing)
+        return decode(self.pca, coordinates)
+
+
+def decode(pca: Pca, coordinates: Floats) -> Floats:
+    """PCA coordinates [T, D] to frames [T, C], in float64 outside of the module."""
+    device = pca.mean.device
+    return pca.decode(torch.from_numpy(coordinates).float().to(device)).cpu().numpy().astype(np.float64)
+
+
+def _of_length(motion: Motion, speech: Speech) -> Motion:
+    """Rounding twice can differ by a frame from rounding once; the phone track decides."""
+    wanted = int(speech.phones.frame_bounds(motion.fps)[-1])
+    rows = np.minimum(np.arange(wanted), len(motion) - 1)
+    return Motion(motion.frames[rows], motion.fps, motion.layout)
