@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from facesynth.atomic import atomic_path
 from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header
+from facesynth.corpus.npz import read_npz
 from facesynth.corpus.record import Record
 from facesynth.corpus.utterance import Utterance
 from facesynth.errors import FacesynthError
@@ -69,16 +69,8 @@ def read_emotion_track(files: Files, record: Record, duration_s: float) -> Emoti
 
 def read_motion(path: Path, header: Header) -> Motion:
     """The motion as it was recorded, NaN where samples are missing; FacesynthError for what is no such file."""
-    if not path.is_file():
-        raise FacesynthError(f"{path} is missing; add the utterance again")
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in ("frames", "head", "eyes", "fps") if name in stored}
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise FacesynthError(f"{path} is not a motion file, or is damaged ({error}); add the utterance again") from None
-    if "frames" not in arrays:
-        raise FacesynthError(f"{path} holds no array 'frames'; wanted frames [T, {header.layout.channels}]")
-    fps = float(arrays.get("fps", header.fps))
+    arrays = read_npz(path)
+    fps = arrays.get("fps", header.fps)
     if not np.isclose(fps, header.fps, rtol=1e-6):
         raise FacesynthError(f"{path} runs at {fps:g} fps, the corpus at {header.fps:g}; resample it and add it again")
     try:

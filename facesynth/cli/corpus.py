@@ -1,0 +1,202 @@
+"""`facesynth corpus`: a performer's recordings, from files to something to learn from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from facesynth.motion.layout import Layout
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FILE = click.Path(path_type=Path)
+as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+
+
+@click.group("corpus")
+def corpus_group() -> None:
+    """Make, fill and check a corpus: a performer's recordings in a folder of plain files."""
+
+
+@corpus_group.command("new")
+@click.argument("folder", type=FOLDER)
+@click.option("--performer", required=True, help="Who was recorded.")
+@click.option(
+    "--layout", "layout_file", type=FILE, required=True, help="YAML or JSON that names the channels, or another corpus.yaml."
+)
+@click.option("--fps", type=float, required=True, help="Rate at which the motion is kept; files of another rate are resampled.")
+@click.option(
+    "--emotions", default="neutral,happy,angry,sad", show_default=True, help="The emotions that the corpus tells apart."
+)
+@click.option("--licence", default="", help="Of every recording that states none of its own; carried into every model.")
+@click.option("--consent", default="", help="Who agreed to what, in words; carried into every model.")
+@click.option("--notes", default="", help="Remarks.")
+@click.option("--synthetic", is_flag=True, help="Voice and face were computed; nobody was recorded.")
+@as_json
+def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: Any) -> None:
+    """Make FOLDER an empty corpus."""
+    from facesynth.corpus import Corpus
+
+    names = [name.strip() for name in emotions.split(",") if name.strip()]
+    corpus = Corpus.create(folder, layout=_read_layout(layout_file), emotions=names, **about)
+    facts = {
+        "path": str(corpus.path),
+        "performer": corpus.performer,
+        "channels": corpus.layout.channels,
+        "emotions": corpus.emotions,
+    }
+    _show(
+        as_json,
+        facts,
+        [f"{folder} is a corpus of {corpus.performer}; add recordings with `facesynth corpus add {folder} FILES…`"],
+    )
+
+
+@corpus_group.command("add")
+@click.argument("folder", type=FOLDER)
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--text", help="What is said, for one recording.")
+@click.option("--text-file", type=FILE, help="The same, from a file.")
+@click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
+@click.option("--emotion", default="neutral", show_default=True, help="Emotion of every recording added.")
+@click.option("--emotions", type=FILE, help="Emotion that moves over time, for one recording: CSV, or lines of `end emotion`.")
+@click.option("--intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Intensity of the emotion.")
+@click.option("--take", type=click.IntRange(min=1), default=1, show_default=True, help="Which take of the sentence it is.")
+@click.option("--sentence", help="One name for the same words in other emotions and takes; the words themselves otherwise.")
+@click.option("--id", "utterance_id", help="Name of the utterance, for one recording; the file's name otherwise.")
+@click.option("--licence", default="", help="Of these recordings; the corpus' own otherwise.")
+@click.option("--consent", default="", help="Who agreed to what; the corpus' own otherwise.")
+@click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
+@as_json
+def add(
+    *,
+    folder: Path,
+    files: tuple[Path, ...],
+    text: str | None,
+    text_file: Path | None,
+    phones: Path | None,
+    emotions: Path | None,
+    utterance_id: str | None,
+    list_file: Path | None,
+    as_json: bool,
+    **about: Any,
+) -> None:
+    """Add recordings to the corpus in FOLDER.
+
+    FILES are files or folders. A recording is a sound (or a video with sound) and a motion file (.npz, .csv) of the
+    same name; beside them may lie NAME.TextGrid (or .lab), NAME.txt and NAME.emotions.csv. Without phones and text,
+    the phones are recognised from the sound. A run that was interrupted can be repeated.
+    """
+    from facesynth.corpus import Corpus
+    from facesynth.corpus.add import add as add_recordings
+    from facesynth.corpus.record import read_records
+
+    known = {**about, "text": text or (_read_text(text_file) if text_file else None), "id": utterance_id}
+    report = add_recordings(
+        Corpus.open(folder),
+        files,
+        {name: value for name, value in known.items() if value is not None},
+        listed=read_records(list_file) if list_file else None,
+        phones=phones,
+        emotions=emotions,
+    )
+    lines = [f"added {len(report.added)}, already there {len(report.unchanged)}, not usable {len(report.refused)}"]
+    _show(as_json, asdict(report), [*lines, *_listing("not added", report.refused), *_remarks(report.remarks)])
+    _leave_if_nothing(not report.added and not report.unchanged, report.refused, "no recording was added")
+
+
+@corpus_group.command("align")
+@click.argument("folder", type=FOLDER)
+@click.option("--id", "ids", multiple=True, help="Only this utterance; may be given several times.")
+@click.option("--force", is_flag=True, help="Also where phones were given or corrected by hand.")
+@as_json
+def align(folder: Path, ids: tuple[str, ...], force: bool, as_json: bool) -> None:
+    """Place the phones of utterances with a text anew; what was corrected by hand stays."""
+    from facesynth.corpus import Corpus
+    from facesynth.corpus.align import align as align_corpus
+
+    report = align_corpus(Corpus.open(folder), ids or None, force)
+    lines = [f"aligned {len(report.aligned)}, kept {len(report.kept)}, failed {len(report.failed)}"]
+    lines += [*_listing("kept", report.kept), *_listing("failed", report.failed), *_remarks(report.warnings)]
+    _show(as_json, asdict(report), lines)
+    _leave_if_nothing(not report.aligned, report.failed, "no utterance was aligned")
+
+
+@corpus_group.command("check")
+@click.argument("folder", type=FOLDER)
+@as_json
+@click.pass_context
+def check(context: click.Context, folder: Path, as_json: bool) -> None:
+    """Say everything that is wrong with a corpus; exit code 2 where something grave is."""
+    from facesynth.corpus.check import check as check_corpus
+
+    problems = check_corpus(folder)
+    grave = sum(problem.grave for problem in problems)
+    summary = f"{grave} problems, {len(problems) - grave} notes" if problems else "nothing is wrong"
+    _show(as_json, {"problems": [asdict(problem) for problem in problems]}, [*map(str, problems), summary])
+    if grave:
+        context.exit(2)
+
+
+@corpus_group.command("stats")
+@click.argument("folder", type=FOLDER)
+@as_json
+def stats(folder: Path, as_json: bool) -> None:
+    """Count what a corpus holds: minutes, emotions, takes, phones, diphones, gaps."""
+    from facesynth.corpus import Corpus
+    from facesynth.corpus.stats import stats as count
+
+    counted = count(Corpus.open(folder))
+    _show(as_json, counted.to_dict(), [counted.text()])
+
+
+def _read_layout(path: Path) -> Layout:
+    import yaml
+
+    from facesynth.errors import FacesynthError
+    from facesynth.motion.layout import Layout
+
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+        return Layout.from_dict(plain.get("layout", plain))
+    except FileNotFoundError:
+        raise FacesynthError(f"{path}: no such layout file") from None
+    except KeyError as error:
+        raise FacesynthError(f"{path}: {error} is missing; a layout needs kind and names") from None
+    except (yaml.YAMLError, OSError, TypeError, AttributeError, ValueError) as error:
+        raise FacesynthError(f"{path} is not a layout: {' '.join(str(error).split())}") from None
+
+
+def _read_text(path: Path) -> str:
+    from facesynth.errors import FacesynthError
+
+    try:
+        return " ".join(path.read_text(encoding="utf-8-sig").split())
+    except (OSError, UnicodeDecodeError) as error:
+        raise FacesynthError(f"{path} cannot be read as text in UTF-8 ({error})") from None
+
+
+def _show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
+    click.echo(json.dumps(facts, ensure_ascii=False, indent=2) if as_json else "\n".join(lines))
+
+
+def _listing(what: str, reasons: Mapping[str, str]) -> list[str]:
+    return [f"{what}: {name}: {reason}" for name, reason in reasons.items()]
+
+
+def _remarks(remarks: Mapping[str, Iterable[str]]) -> list[str]:
+    return [f"{name}: {remark}" for name, said in remarks.items() for remark in said]
+
+
+def _leave_if_nothing(nothing: bool, reasons: Mapping[str, str], what: str) -> None:
+    """One clear error where a command could do nothing at all."""
+    from facesynth.errors import FacesynthError
+
+    if nothing and reasons:
+        name, reason = next(iter(reasons.items()))
+        raise FacesynthError(f"{what}; {name}: {reason}")
