@@ -1,0 +1,67 @@
+"""The command line: `facesynth VERB …`. Verbs are imported when they are called, so that --help starts at once."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import click
+
+from facesynth import __version__
+from facesynth.errors import FacesynthError
+
+VERBS = {
+    "demo": ("facesynth.cli.demo:demo", "Built-in performer: corpus, training, speech, video."),
+    "corpus": ("facesynth.cli.corpus:corpus_group", "Make, fill and check a performer's recordings."),
+    "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
+    "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
+    "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
+    "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),
+}
+
+
+class Verbs(click.Group):
+    """Loads a verb's module only when that verb is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Verbs in the order of a newcomer's day."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command behind a verb."""
+        if cmd_name not in VERBS:
+            return None
+        module, _, name = VERBS[cmd_name][0].partition(":")
+        command: click.Command = getattr(importlib.import_module(module), name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """One line for each verb, without importing any."""
+        with formatter.section("Verbs"):
+            formatter.write_dl([(verb, line) for verb, (_, line) in VERBS.items()])
+
+
+@click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="facesynth")
+def cli() -> None:
+    """Talking, feeling faces driven by speech, learned from recordings of one performer."""
+
+
+def main() -> None:
+    """Run the command line: 0 when all is well, 2 with one line for wrong input, 1 with a traceback for a bug."""
+    try:
+        cli.main(standalone_mode=False)
+    except FacesynthError as error:
+        _leave(str(error))
+    except click.ClickException as error:
+        _leave(error.format_message())
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; what was finished before is kept", err=True)
+        sys.exit(130)
+    except OSError as error:
+        _leave(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
+
+
+def _leave(message: str) -> None:
+    click.echo("error: " + " ".join(message.split()), err=True)
+    sys.exit(2)

@@ -1,0 +1,218 @@
+"""`facesynth speak`."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from facesynth.errors import FacesynthError
+
+if TYPE_CHECKING:
+    from facesynth.methods.method import Method
+    from facesynth.speech.hearing import Heard
+
+AUDIO_SUFFIXES = (
+    ".wav",
+    ".flac",
+    ".ogg",
+    ".mp3",
+    ".m4a",
+    ".aac",
+    ".aiff",
+    ".aif",
+    ".opus",
+    ".mp4",
+    ".mov",
+    ".mkv",
+    ".mpg",
+    ".avi",
+)
+BROADCAST = {"23.976": Fraction(24000, 1001), "29.97": Fraction(30000, 1001), "59.94": Fraction(60000, 1001)}
+
+
+class Gain(click.ParamType):
+    """`off` or a factor."""
+
+    name = "off|gain"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """A number that is not negative."""
+        try:
+            gain = 0.0 if value == "off" else float(value)
+        except ValueError:
+            gain = -1.0
+        if gain < 0:
+            self.fail(f"wanted off or a factor such as 0.5; got {value!r}", param, ctx)
+        return gain
+
+
+class Fps(click.ParamType):
+    """A frame rate; 23.976, 29.97 and 59.94 mean the broadcast fractions."""
+
+    name = "fps"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        """An exact fraction."""
+        try:
+            fps = BROADCAST.get(str(value)) or Fraction(str(value)).limit_denominator(100000)
+        except (ValueError, ZeroDivisionError):
+            fps = Fraction(0)
+        if not 1 <= fps <= 1000:
+            self.fail(f"wanted a rate from 1 to 1000 such as 30, 23.976 or 30000/1001; got {value!r}", param, ctx)
+        return fps
+
+
+@click.command("speak")
+@click.argument("model", type=click.Path(path_type=Path))
+@click.argument("speech", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File to write: .mp4 .csv .glb .npz .bvh; several may be given. {name} stands for the name of the speech file.",
+)
+@click.option("--text", help="What is said.")
+@click.option("--text-file", type=click.Path(path_type=Path), help="The same, from a file.")
+@click.option("--phones", type=click.Path(path_type=Path), help="TextGrid, or lines of `end label`.")
+@click.option("--emotion", help="One emotion for everything.")
+@click.option("--emotions", type=click.Path(path_type=Path), help="Emotion over time: CSV, or lines of `end emotion`.")
+@click.option("--intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of --emotion; 0 is neutral.")
+@click.option(
+    "--constraints",
+    type=click.Path(path_type=Path),
+    help="CSV of nodes that must be used: phone_index or time_s, utterance_id, phone_number.",
+)
+@click.option("--fps", type=Fps(), default="30", show_default=True, help="Frame rate of what is written.")
+@click.option("--head", type=Gain(), default="1", show_default=True, help="off, or a factor on head motion.")
+@click.option("--eyes", type=Gain(), default="1", show_default=True, help="off, or a factor on gaze.")
+@click.option("--size", default="1280x720", show_default=True, help="Of the video.")
+@click.option("--explain", type=click.Path(path_type=Path), help="Write why each phone got its node (JSON).")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: Any) -> None:
+    """Turn SPEECH, files or folders of them, into a talking face.
+
+    A transcript (clip.txt) or phones (clip.TextGrid) beside a sound file are used where none are given.
+    """
+    from facesynth.methods.registry import load
+    from facesynth.speaking import check_output
+
+    outputs = [check_output(path) for path in options["outputs"]]
+    recordings = _recordings(speech)
+    if len(recordings) > 1:
+        _require_batch(outputs, options)
+    size = _size(options["size"])
+    method = load(model)
+    results = [_speak_one(method, path, outputs, size, options) for path in recordings]
+    if as_json:
+        click.echo(json.dumps(results if len(results) > 1 else results[0]))
+
+
+def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
+    from facesynth.atomic import write_text
+    from facesynth.face.rig import load_head
+    from facesynth.speaking import Stage, perform, write_performance
+    from facesynth.speech.textgrid import write_textgrid
+
+    heard = _hear(path, method, options)
+    for warning in heard.warnings:
+        click.echo(f"warning: {path.name}: {warning}", err=True)
+    settings = _method_options(method, heard, options)
+    rig = load_head()
+    stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"])
+    performance = perform(method, heard.speech, rig, stage, settings)
+    targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
+    for target in targets:
+        write_performance(target, performance, rig, size)
+        click.echo(f"{target}: {heard.speech.duration_s:.2f} s at {float(options['fps']):.5g} fps", err=True)
+    written = [str(target) for target in targets]
+    if heard.source in ("transcript", "recognition"):
+        grid = targets[0].with_suffix(".TextGrid")
+        write_textgrid(grid, heard.speech.phones, heard.words)
+        written.append(str(grid))
+    if options["explain"]:
+        write_text(options["explain"], json.dumps(method.explain(heard.speech, **settings), indent=1))
+        written.append(str(options["explain"]))
+    return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written}
+
+
+def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
+    from facesynth.speech.hearing import hear
+
+    text, phones = _given_text(options), options["phones"]
+    if text is None and phones is None:
+        phones = next((p for p in [path.with_suffix(".TextGrid")] if p.exists()), None)
+    if text is None and phones is None and path.with_suffix(".txt").exists():
+        text = _read_text(path.with_suffix(".txt"))
+    emotion = options["emotion"] or (None if options["emotions"] else method.emotions[0])
+    feeling = {"emotion": emotion, "emotions_path": options["emotions"], "intensity": options["intensity"]}
+    return hear(path, text=text, phones_path=phones, **feeling)
+
+
+def _method_options(method: Method, heard: Heard, options: dict[str, Any]) -> dict[str, Any]:
+    if not (options["constraints"] or options["explain"]):
+        return {}
+    if not hasattr(method, "explain"):
+        raise FacesynthError(f"{method.name} has no nodes to constrain or explain; efase has")
+    if not options["constraints"]:
+        return {}
+    from facesynth.methods.efase.constraints import read_constraints
+
+    return {"constraints": read_constraints(options["constraints"], heard.speech.phones)}
+
+
+def _given_text(options: dict[str, Any]) -> str | None:
+    if options["text"] is not None and options["text_file"] is not None:
+        raise FacesynthError("both --text and --text-file were given; give one")
+    return _read_text(options["text_file"]) if options["text_file"] else options["text"]
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FacesynthError(f"{path}: cannot read the transcript ({error})") from None
+
+
+def _recordings(paths: tuple[Path, ...]) -> list[Path]:
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO_SUFFIXES)
+            if not inside:
+                raise FacesynthError(f"{path} holds no sound; wanted files such as clip{AUDIO_SUFFIXES[0]}")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise FacesynthError(f"{path}: no such file")
+    return found
+
+
+def _require_batch(outputs: list[Path], options: dict[str, Any]) -> None:
+    if any("{name}" not in str(output) for output in outputs):
+        raise FacesynthError("several recordings need {name} in every output, such as -o 'out/{name}.mp4'")
+    for key in ("text", "text_file", "phones", "constraints", "explain"):
+        if options[key]:
+            raise FacesynthError(
+                f"--{key.replace('_', '-')} belongs to one recording; put clip.txt or clip.TextGrid beside each sound"
+            )
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if (
+        not (width.isdigit() and height.isdigit())
+        or not 32 <= min(int(width), int(height)) <= max(int(width), int(height)) <= 4096
+    ):
+        raise FacesynthError(f"--size wants WIDTHxHEIGHT from 32 to 4096, such as 1280x720; got {text!r}")
+    if int(width) % 2 or int(height) % 2:
+        raise FacesynthError(f"--size must be even in both directions for H.264; got {text!r}")
+    return int(width), int(height)

@@ -1,0 +1,55 @@
+"""`facesynth train`."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import click
+
+
+@click.command("train")
+@click.argument("method")
+@click.argument("corpus", type=click.Path(path_type=Path))
+@click.argument("settings", nargs=-1, metavar="[KEY=VALUE]...")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Model file; METHOD.safetensors in this folder otherwise.")
+@click.option("--config", type=click.Path(path_type=Path), help="YAML file of settings; KEY=VALUE goes before it.")
+@click.option(
+    "--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Which sentences to learn from."
+)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def train(
+    *,
+    method: str,
+    corpus: Path,
+    settings: tuple[str, ...],
+    output: Path | None,
+    config: Path | None,
+    split: str,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Train METHOD on CORPUS and write one model file."""
+    from facesynth.config import load_config, parse_settings
+    from facesynth.corpus import Corpus
+    from facesynth.methods.registry import create
+
+    model = create(method, **{**(load_config(config) if config else {}), **parse_settings(settings)})
+    recordings = Corpus.open(corpus)
+    if split == "train":
+        recordings, _ = recordings.split(seed)
+    start = time.perf_counter()
+    model.fit(recordings, seed=seed)
+    seconds = time.perf_counter() - start
+    path = output or Path(f"{method}.safetensors")
+    model.save(path)
+    size_mb = path.stat().st_size / 1e6
+    facts = {"model": str(path), "method": method, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
+    if as_json:
+        click.echo(json.dumps({**facts, "synthetic": recordings.synthetic}))
+        return
+    kind = "synthetic performer" if recordings.synthetic else "performer"
+    click.echo(f"{method} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
+    click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

@@ -1,0 +1,47 @@
+"""Method settings from YAML files and from `key=value` on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from facesynth.errors import FacesynthError
+
+
+def load_config(path: str | Path) -> dict[str, Any]:
+    """The settings of a flat YAML file; `include: other.yaml`, beside it, gives what it does not say itself.
+
+    One level only: an included file may not include another.
+    """
+    settings = _read(Path(path))
+    included = settings.pop("include", None)
+    if included is None:
+        return settings
+    base = _read(Path(path).parent / str(included))
+    if "include" in base:
+        raise FacesynthError(f"{path}: {included} includes another file; only one level of include is read")
+    return {**base, **settings}
+
+
+def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
+    """`["components=20", "phi=0.1"]` to a dictionary; values are read as YAML."""
+    settings = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key:
+            raise FacesynthError(f"{pair!r} is no setting; wanted key=value, such as components=20")
+        settings[key.strip()] = yaml.safe_load(value)
+    return settings
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise FacesynthError(f"{path}: cannot read settings ({error})") from None
+    if not isinstance(loaded, Mapping):
+        raise FacesynthError(f"{path}: wanted lines of `key: value`; got {type(loaded).__name__}")
+    return dict(loaded)

@@ -1,0 +1,98 @@
+"""From speech to a face that one can watch: the way through the house, in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import unknown
+from facesynth.face.animation import FaceAnimation, animate
+from facesynth.face.files.write import SUFFIXES, write_animation
+from facesynth.face.rig import Rig, pose
+from facesynth.methods.method import Method
+from facesynth.motion.motion import Motion
+from facesynth.motion.sway import quiet_head
+from facesynth.progress import track
+from facesynth.speech.speech import Speech
+
+if TYPE_CHECKING:
+    from facesynth.face.render import Renderer
+
+VIDEO_SUFFIXES = (".mp4",)
+OUTPUTS = (*VIDEO_SUFFIXES, *SUFFIXES)
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """One utterance, said by a face."""
+
+    speech: Speech
+    motion: Motion
+    """What the method made, at its own rate."""
+    animation: FaceAnimation
+    """The same on the head, at the rate asked for."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """How a motion is put on the head."""
+
+    fps: float = 30.0
+    head_gain: float = 1.0
+    eyes_gain: float = 1.0
+    seed: int = 0
+
+
+def perform(method: Method, speech: Speech, rig: Rig, stage: Stage, options: Mapping[str, Any] | None = None) -> Performance:
+    """Synthesise and put on the head; `options` go to the method.
+
+    A method that makes no head motion gets a quiet sway with nods where the voice is loud.
+    """
+    motion = method.synthesize(speech, seed=stage.seed, **(options or {}))
+    lively = motion
+    if motion.head is None:
+        lively = replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), stage.seed))
+    gains = {"head_gain": stage.head_gain, "eyes_gain": stage.eyes_gain}
+    animation = animate(lively, rig, seed=stage.seed, phones=speech.phones, **gains)
+    return Performance(speech, motion, animation.resampled(stage.fps))
+
+
+def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
+    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
+    window = max(int(0.03 * speech.sample_rate), 1)
+    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
+    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
+    level = np.sqrt(power[at])
+    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)
+
+
+def check_output(path: str | Path) -> Path:
+    """A path whose suffix can be written; FacesynthError for any other."""
+    if Path(path).suffix.lower() not in OUTPUTS:
+        raise unknown("output type", Path(path).suffix or str(path), OUTPUTS)
+    return Path(path)
+
+
+def write_performance(path: str | Path, performance: Performance, rig: Rig, size: tuple[int, int] = (1280, 720)) -> None:
+    """Write one output; the suffix says which. It appears whole or not at all."""
+    if check_output(path).suffix.lower() not in VIDEO_SUFFIXES:
+        write_animation(path, performance.animation, rig, performance.motion)
+        return
+    from facesynth.face.render import Renderer
+    from facesynth.face.video import write_video
+
+    frames = rendered(performance.animation, rig, Renderer(rig, size))
+    write_video(path, frames, performance.animation.fps, performance.speech.audio, performance.speech.sample_rate)
+
+
+def rendered(animation: FaceAnimation, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
+    """Pictures [h, w, 3] of the face, one for each frame."""
+    for k in track(range(len(animation)), "rendering"):
+        yield renderer.render(
+            pose(rig, animation.weights[k], animation.head[k], animation.gaze[k], float(animation.tongue_up[k]))
+        )
