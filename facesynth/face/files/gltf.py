@@ -156,10 +156,16 @@ def _inverse_binds(buffer: Buffer) -> int:
 def _materials() -> list[gl.Material]:
     materials = []
     for name, (colour, roughness) in _COLOURS.items():
-        surface = gl.PbrMetallicRoughness(baseColorFactor=[*colour, 1.0], metallicFactor=0.0, roughnessFactor=roughness)
+        hairs = name == "lashes"  # strips that hairs cover by less than half
+        surface = gl.PbrMetallicRoughness(
+            baseColorFactor=[*colour, 0.4 if hairs else 1.0], metallicFactor=0.0, roughnessFactor=roughness
+        )
         if name == "eyes":
             surface.baseColorTexture = gl.TextureInfo(index=0)
-        materials.append(gl.Material(name=name, pbrMetallicRoughness=surface, doubleSided=name == "lashes", alphaCutoff=None))
+        mode = gl.BLEND if hairs else gl.OPAQUE
+        materials.append(
+            gl.Material(name=name, pbrMetallicRoughness=surface, doubleSided=hairs, alphaMode=mode, alphaCutoff=None)
+        )
     return materials
 
 

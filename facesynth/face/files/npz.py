@@ -40,9 +40,9 @@ def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None 
 def read_npz(path: str | Path) -> tuple[FaceAnimation, Motion | None]:
     """Read what `write_npz` wrote; the motion is None where the file has none."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise FacesynthError(f"{path} is no npz file of facesynth, or is truncated ({error})") from None
     missing = [name for name in _ANIMATION if name not in arrays]
     if missing:
