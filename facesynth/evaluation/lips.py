@@ -1,12 +1,15 @@
 """Whether the mouth opens and shuts as much, and when, as the recorded one did.
 
 The opening is `facesynth.motion.lips.lip_gap`: upper minus lower inner lip, vertical, in the unit of the layout (u).
+Blendshape curves are posed on the built-in head first: their opening is in mm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +19,9 @@ from facesynth.motion.lips import lip_gap
 from facesynth.motion.motion import Motion
 from facesynth.speech.phones import BILABIALS, OPEN_VOWELS
 from facesynth.speech.speech import PhoneTrack
+
+if TYPE_CHECKING:
+    from facesynth.face.markers import LipGap
 
 
 def lip_gap_corr(synthesised: Motion, truth: Motion) -> float:
@@ -67,8 +73,10 @@ def false_closure_rate(synthesised: Motion, phones: PhoneTrack, threshold: float
 
 
 def lip_opening(motion: Motion) -> Array:
-    """[T] vertical opening of the inner lips (u); UnavailableError where the layout has no lip pairs."""
-    if motion.layout.kind == "curves" or not motion.layout.lip_pairs:
+    """[T] vertical opening of the inner lips (u; mm for curves); UnavailableError where the layout does not tell it."""
+    if motion.layout.kind == "curves":
+        return _opening_on_head(motion)
+    if not motion.layout.lip_pairs:
         raise UnavailableError("the layout has no pairs of inner-lip points")
     return np.asarray(lip_gap(motion), np.float64)
 
@@ -81,6 +89,29 @@ def paired_gaps(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:
     if present.sum() < 3 or not yours[present].std() > 0:
         raise UnavailableError("the recorded mouth stands still or is missing")
     return mine[present], yours[present]
+
+
+def _opening_on_head(motion: Motion) -> Array:
+    """[T] opening (mm) that ARKit curves give the built-in head; curves that the layout lacks are 0."""
+    from facesynth.face.head import ARKIT_NAMES
+
+    known = [i for i, name in enumerate(motion.layout.names) if name in ARKIT_NAMES]
+    if not {"jawOpen", "mouthClose"} & set(motion.layout.names):
+        raise UnavailableError("the curves are no ARKit shapes that open the mouth")
+    weights = np.zeros((len(motion), len(ARKIT_NAMES)))
+    weights[:, [ARKIT_NAMES.index(motion.layout.names[i]) for i in known]] = motion.frames[:, known]
+    return np.asarray(_head_gap().opening_mm(weights), np.float64)
+
+
+@cache
+def _head_gap() -> LipGap:
+    from facesynth.face.markers import LipGap
+    from facesynth.face.rig import load_head
+
+    try:
+        return LipGap.of(load_head())
+    except FacesynthError as error:
+        raise UnavailableError(f"the built-in head is not here ({error})") from None
 
 
 def _smallest_gaps(gap: Array, phones: PhoneTrack, fps: float) -> Array:

@@ -125,3 +125,18 @@ def test_warping_path_is_the_least_over_all_paths():
         assert path[[0, -1]].tolist() == [[0, 0], [5, 5]]
         assert (np.diff(path, axis=0) >= 0).all()
         assert (np.abs(np.diff(timing._dtw_path(a, b, 1), axis=1)) <= 1).all()
+
+
+def test_curves_open_the_mouth_of_the_built_in_head():
+    pytest.importorskip("anny", reason="the built-in head is in an extra: pip install 'facesynth[head]'", exc_type=ImportError)
+    layout = Layout("curves", ("jawOpen", "mouthClose"), {"mouth": (0, 1)})
+    jaw = 0.3 + 0.2 * np.sin(np.arange(60) / 5)
+    gap = lips.lip_opening(Motion(np.stack([jaw, np.zeros(60)], 1), 30, layout))
+    assert np.corrcoef(gap, jaw)[0, 1] == pytest.approx(1)
+    assert 20 < np.ptp(gap) / np.ptp(jaw) < 40  # mm per unit of jawOpen
+    assert lips.lip_opening(Motion(np.stack([jaw, jaw], 1), 30, layout)).max() < 2
+
+
+def test_other_curves_have_no_opening():
+    with pytest.raises(UnavailableError, match="ARKit"):
+        lips.lip_opening(Motion(np.zeros((5, 1)), 30, Layout("curves", ("smile",))))

@@ -1,0 +1,105 @@
+"""What judges the motion of one method: the recordings, and figures utterance by utterance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from facesynth.corpus import Corpus, Utterance
+from facesynth.errors import FacesynthError
+from facesynth.evaluation.emotion_recognition import Confusion, EmotionRecogniser
+from facesynth.evaluation.lips import closure_threshold
+from facesynth.evaluation.metrics import METRICS, Case
+from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.table import Row
+from facesynth.motion.motion import Motion
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Judge:
+    """What the recordings must tell before a motion can be judged."""
+
+    closure_threshold: float
+    """Opening that counts as shut, unit of the layout; NaN where nobody says p, b or m."""
+    recogniser: EmotionRecogniser | None
+    """None where the training recordings have a single emotion."""
+
+    @classmethod
+    def from_recordings(cls, train: Corpus, test: Corpus) -> Self:
+        """The threshold from the truth that is tested on, the recogniser from the sentences that are not."""
+        try:
+            threshold = closure_threshold((utterance.motion, utterance.speech.phones) for utterance in test)
+        except UnavailableError:
+            threshold = NAN
+        emotions = {record.emotion for record in train.usable_records}
+        return cls(threshold, EmotionRecogniser.fit(train) if len(emotions) > 1 else None)
+
+    def figures(self, utterance: Utterance, motion: Motion) -> Iterator[tuple[str, float, str]]:
+        """(metric, value, reason why it is NaN) of one utterance."""
+        case = Case(motion, utterance.motion, utterance.speech.phones, self.closure_threshold)
+        for metric in METRICS:
+            try:
+                yield metric.name, metric.measure(case), ""
+            except UnavailableError as reason:
+                yield metric.name, NAN, str(reason)
+
+    def recorded(self, test: Corpus) -> Confusion | None:
+        """What the recogniser makes of the recordings themselves."""
+        if self.recogniser is None:
+            return None
+        whole = [u for u in test if not np.isnan(u.motion.frames).any(axis=1).all()]
+        return Confusion.of([u.emotion for u in whole], [self.recogniser.recognise(u.motion) for u in whole])
+
+
+class Tally:
+    """Figures of one method, utterance by utterance."""
+
+    def __init__(self, judge: Judge) -> None:
+        self.judge = judge
+        self.values: dict[str, list[float]] = {}
+        self.reasons: dict[str, str] = {}
+        self.emotions: list[tuple[str, str]] = []
+        self.count = 0
+
+    def add(self, utterance: Utterance, motion: Motion) -> None:
+        """Judge one utterance."""
+        self.count += 1
+        try:
+            for name, value, reason in self.judge.figures(utterance, motion):
+                self.set(name, value, reason)
+        except FacesynthError as error:
+            raise FacesynthError(f"utterance {utterance.id!r} cannot be judged: {error}") from None
+        self._add_emotion(utterance.emotion, motion)
+
+    def miss(self, reason: str) -> None:
+        """Count an utterance for which there is no motion."""
+        self.count += 1
+        for metric in METRICS:
+            self.set(metric.name, NAN, reason)
+        self.set("emotion_accuracy", NAN, reason)
+
+    def set(self, name: str, value: float, reason: str = "") -> None:
+        """The figure `name` of the newest utterance; earlier ones that lack it are NaN."""
+        column = self.values.setdefault(name, [])
+        column += [NAN] * (self.count - 1 - len(column)) + [value]
+        if reason:
+            self.reasons.setdefault(name, reason)
+
+    def row(self, label: str, costs: Mapping[str, float]) -> Row:
+        """The method's row."""
+        values = {name: tuple(column + [NAN] * (self.count - len(column))) for name, column in self.values.items()}
+        confusion = Confusion.of(*zip(*self.emotions, strict=True)) if self.emotions else None
+        return Row(label, values, costs, self.reasons, confusion)
+
+    def _add_emotion(self, asked: str, motion: Motion) -> None:
+        if self.judge.recogniser is None:
+            self.set("emotion_accuracy", NAN, "the recordings to learn from show a single emotion")
+            return
+        recognised = self.judge.recogniser.recognise(motion)
+        self.emotions.append((asked, recognised))
+        self.set("emotion_accuracy", float(asked == recognised))

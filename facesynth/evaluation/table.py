@@ -1,0 +1,194 @@
+"""What came out of a comparison, as a table for people and as files for programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import unknown
+from facesynth.evaluation.emotion_recognition import Confusion
+
+DRAWS = 2000
+"""Bootstrap samples of the utterances."""
+ARROWS: Mapping[str, str] = {"low": " ↓", "high": " ↑", "0": " → 0", "1": " → 1", "": ""}
+
+
+@dataclass(frozen=True)
+class Column:
+    """One figure."""
+
+    name: str
+    unit: str
+    best: str = ""
+    """low, high, 0, 1, or nothing where no way is better."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method."""
+
+    label: str
+    values: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """By column: the figure of each utterance, NaN where it has none."""
+    costs: Mapping[str, float] = field(default_factory=dict)
+    """By column: figures of the whole run, which have no interval."""
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """By column: why utterances have no figure."""
+    confusion: Confusion | None = None
+
+
+@dataclass(frozen=True)
+class Score:
+    """Mean over the utterances that have a figure, with its 95 % bootstrap interval."""
+
+    mean: float
+    low: float
+    high: float
+    utterances: int
+
+    def __str__(self) -> str:
+        if not self.utterances:
+            return "—"
+        return _number(self.mean) + (f" [{_number(self.low)}, {_number(self.high)}]" if self.low < self.high else "")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Methods judged on the same utterances."""
+
+    columns: tuple[Column, ...]
+    utterances: tuple[str, ...]
+    rows: tuple[Row, ...]
+    seed: int
+    recorded_emotions: Confusion | None = None
+    """What the emotion classifier makes of the recordings themselves: the most that a method can reach."""
+    provenance: Mapping[str, object] = field(default_factory=dict)
+    """The recordings learned from and judged by."""
+
+    @cached_property
+    def scores(self) -> Mapping[str, Mapping[str, Score]]:
+        """By row label and column name."""
+        return {row.label: {column.name: self._score(row, column.name) for column in self.columns} for row in self.rows}
+
+    def markdown(self, columns: Sequence[str] | None = None) -> str:
+        """A table, a row per method: mean [95 % interval]; under it why figures are missing."""
+        chosen = [self._column(name) for name in columns] if columns else list(self.columns)
+        header = [
+            "method",
+            *(f"{c.name} ({c.unit}){ARROWS[c.best]}" if c.unit != "1" else c.name + ARROWS[c.best] for c in chosen),
+        ]
+        lines = [header, ["---"] + ["---:"] * len(chosen)]
+        lines += [[row.label, *(str(self.scores[row.label][c.name]) for c in chosen)] for row in self.rows]
+        table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        return "\n\n".join([table, *self._notes(chosen)]) + "\n"
+
+    def csv(self) -> str:
+        """A line per method and figure: mean, interval, number of utterances, and why some are missing."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(("method", "figure", "unit", "best", "mean", "low", "high", "utterances", "reason"))
+        for row in self.rows:
+            for column in self.columns:
+                score = self.scores[row.label][column.name]
+                figures = [_plain(value) for value in (score.mean, score.low, score.high)]
+                names = (row.label, column.name, column.unit, column.best)
+                writer.writerow((*names, *figures, score.utterances, row.reasons.get(column.name, "")))
+        return text.getvalue()
+
+    def json(self) -> str:
+        """Everything, each utterance's figures included; null where there is none."""
+        plain = {
+            "seed": self.seed,
+            "utterances": self.utterances,
+            "columns": [{"name": c.name, "unit": c.unit, "best": c.best} for c in self.columns],
+            "rows": [self._row_dict(row) for row in self.rows],
+            "recorded_emotions": _confusion_dict(self.recorded_emotions),
+            "provenance": self.provenance,
+        }
+        return json.dumps(plain, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def _score(self, row: Row, column: str) -> Score:
+        if column in row.costs:
+            cost = row.costs[column]
+            return Score(cost, cost, cost, 0 if math.isnan(cost) else len(self.utterances))
+        values = np.array(row.values.get(column, ()), np.float64)
+        values = values[~np.isnan(values)]
+        if not values.size:
+            return Score(math.nan, math.nan, math.nan, 0)
+        return Score(float(values.mean()), *interval(values, self.seed), len(values))
+
+    def _column(self, name: str) -> Column:
+        for column in self.columns:
+            if column.name == name:
+                return column
+        raise unknown("figure", name, (column.name for column in self.columns))
+
+    def _notes(self, chosen: Sequence[Column]) -> list[str]:
+        """Reasons for missing figures, one for each, and the ceiling of the emotion classifier."""
+        missing: dict[str, list[str]] = {}
+        for row in self.rows:
+            for column in chosen:
+                score = self.scores[row.label][column.name]
+                if not score.utterances:
+                    reason = row.reasons.get(column.name, "the method does not report it")
+                    missing.setdefault(f"{column.name}: {reason}", []).append(row.label)
+        notes = [f"— {reason} ({', '.join(labels)})" for reason, labels in missing.items()]
+        if self.recorded_emotions and any(column.name == "emotion_accuracy" for column in chosen):
+            recall = _number(self.recorded_emotions.unweighted_average_recall)
+            accuracy = _number(self.recorded_emotions.accuracy)
+            notes.append(f"The recordings themselves: emotion accuracy {accuracy}, unweighted average recall {recall}.")
+        return notes
+
+    def _row_dict(self, row: Row) -> dict[str, object]:
+        return {
+            "label": row.label,
+            "scores": {
+                name: {"mean": _finite(s.mean), "low": _finite(s.low), "high": _finite(s.high), "utterances": s.utterances}
+                for name, s in self.scores[row.label].items()
+            },
+            "values": {name: [_finite(value) for value in values] for name, values in row.values.items()},
+            "reasons": dict(row.reasons),
+            "confusion": _confusion_dict(row.confusion),
+        }
+
+
+def interval(values: NDArray[np.float64], seed: int) -> tuple[float, float]:
+    """2.5 and 97.5 % of the means of DRAWS samples drawn from values [U] with replacement."""
+    draws = np.random.default_rng(seed).integers(len(values), size=(DRAWS, len(values)))
+    low, high = np.percentile(values[draws].mean(axis=1), [2.5, 97.5])
+    return float(low), float(high)
+
+
+def _confusion_dict(confusion: Confusion | None) -> dict[str, object] | None:
+    if confusion is None:
+        return None
+    return {
+        "emotions": confusion.emotions,
+        "asked_by_recognised": confusion.counts.tolist(),
+        "accuracy": _finite(confusion.accuracy),
+        "unweighted_average_recall": _finite(confusion.unweighted_average_recall),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _plain(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else ""
+
+
+def _number(value: float) -> str:
+    """Three significant digits, never in exponents."""
+    if value == 0:
+        return "0"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{min(digits, 5)}f}"

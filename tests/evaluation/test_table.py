@@ -1,0 +1,78 @@
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+from facesynth.errors import FacesynthError
+from facesynth.evaluation.emotion_recognition import Confusion
+from facesynth.evaluation.table import Column, Comparison, Row, interval
+
+NAN = math.nan
+COLUMNS = (
+    Column("lve", "mm", "low"),
+    Column("fdd", "mm", "0"),
+    Column("emotion_accuracy", "1", "high"),
+    Column("rtf", "1", "low"),
+)
+
+
+def comparison():
+    good = Row(
+        "good", {"lve": (1, 2, 3, 2), "fdd": (NAN,) * 4, "emotion_accuracy": (1, 1, 1, 0)}, {"rtf": 0.01}, {"fdd": "no rest"}
+    )
+    poor = Row("poor", {"lve": (4, NAN, 4, 4), "fdd": (NAN,) * 4}, {"rtf": NAN}, {"fdd": "no rest", "rtf": "no clock"})
+    return Comparison(COLUMNS, tuple("abcd"), (good, poor), 0, Confusion.of(["x", "y"], ["x", "y"]), {"train": {"minutes": 1}})
+
+
+def test_scores_are_means_over_the_utterances_that_have_one():
+    scores = comparison().scores
+    assert scores["good"]["lve"].mean == 2
+    assert scores["good"]["lve"].low < 2 < scores["good"]["lve"].high
+    assert (scores["poor"]["lve"].mean, scores["poor"]["lve"].low, scores["poor"]["lve"].utterances) == (4, 4, 3)
+    assert scores["good"]["fdd"].utterances == 0
+
+
+def test_the_interval_covers_the_true_mean_about_as_often_as_it_says():
+    rng = np.random.default_rng(0)
+    covers = [low <= 0 <= high for low, high in (interval(rng.normal(size=40), i) for i in range(200))]
+    assert 0.88 <= np.mean(covers) <= 0.99
+    values = rng.normal(size=40)
+    assert interval(values, 3) == interval(values, 3)
+    assert np.ptp(interval(np.repeat(values, 16), 0)) < 0.4 * np.ptp(interval(values, 0))
+
+
+def test_markdown_gives_units_directions_intervals_and_reasons():
+    text = comparison().markdown()
+    lines = text.splitlines()
+    assert lines[0] == "| method | lve (mm) ↓ | fdd (mm) → 0 | emotion_accuracy ↑ | rtf ↓ |"
+    assert lines[2].startswith("| good | 2.00 [")
+    assert lines[3] == "| poor | 4.00 | — | — | — |"
+    assert "— fdd: no rest (good, poor)" in lines
+    assert "— rtf: no clock (poor)" in lines
+    assert "The recordings themselves: emotion accuracy 1.00, unweighted average recall 1.00." in lines
+
+
+def test_markdown_of_chosen_figures():
+    assert comparison().markdown(["rtf"]).splitlines()[:3] == ["| method | rtf ↓ |", "| --- | ---: |", "| good | 0.0100 |"]
+    with pytest.raises(FacesynthError, match="lve"):
+        comparison().markdown(["lwe"])
+
+
+def test_csv_has_a_line_per_method_and_figure():
+    rows = list(csv.DictReader(io.StringIO(comparison().csv())))
+    assert len(rows) == 8
+    assert rows[0]["method"] == "good"
+    assert float(rows[0]["mean"]) == 2
+    assert rows[1]["mean"] == ""
+    assert rows[1]["reason"] == "no rest"
+
+
+def test_json_has_every_utterance_and_no_nan():
+    plain = json.loads(comparison().json(), parse_constant=pytest.fail)
+    assert plain["rows"][1]["values"]["lve"] == [4, None, 4, 4]
+    assert plain["rows"][0]["scores"]["lve"]["mean"] == 2
+    assert plain["recorded_emotions"]["asked_by_recognised"] == [[1, 0], [0, 1]]
+    assert plain["provenance"] == {"train": {"minutes": 1}}
