@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from facesynth.atomic import write_text
@@ -71,9 +72,18 @@ def write_header(path: Path, header: Header) -> None:
         "licence": header.licence,
         "consent": header.consent,
         "notes": header.notes,
-        "layout": header.layout.to_dict(),
+        "layout": _plain(header.layout.to_dict()),
     }
     write_text(path, yaml.safe_dump(plain, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers, which a layout computed elsewhere may hold, as Python's."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _header(plain: dict[str, Any]) -> Header:

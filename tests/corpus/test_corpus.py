@@ -10,6 +10,7 @@ from corpora import EMOTIONS, tiny_corpus, tiny_layout, tiny_utterances
 from facesynth.corpus import Corpus, Record
 from facesynth.corpus.signals import fit_length
 from facesynth.errors import FacesynthError
+from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 from facesynth.speech.speech import EmotionTrack, Speech
 
@@ -75,6 +76,14 @@ def test_motion_is_as_long_as_the_phones_and_short_gaps_are_filled(tmp_path):
     assert np.isnan(utterance.motion.frames[-3:]).all()
     assert (report.filled_samples, len(report.long_gaps)) == (8 * 14, 1)
     assert np.isnan(corpus.raw_motion(record.id).frames[30:38]).all()
+
+
+def test_a_layout_with_numbers_of_numpy_can_be_kept(tmp_path):
+    layout = Layout("markers", ("a", "b"), {"mouth": tuple(np.arange(2))}, ((np.int64(0), np.int64(1)),), tuple(np.arange(6.0)))
+    Corpus.create(tmp_path / "c", **{**ABOUT, "layout": layout, "fps": np.float32(60)})
+    kept = Corpus.open(tmp_path / "c")
+    assert kept.layout == layout
+    assert type(kept.layout.neutral[0]) is float
 
 
 def test_fit_length_cuts():
