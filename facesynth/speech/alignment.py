@@ -1,0 +1,160 @@
+"""When each phone of a known transcript is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+from facesynth.progress import track
+from facesynth.speech.audio import require_sound
+from facesynth.speech.fitting import Fitted, fit_phones, fit_words
+from facesynth.speech.phones import SILENCE
+from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
+from facesynth.speech.segments import Segment, phone_track
+from facesynth.speech.speech import PhoneTrack
+from facesynth.speech.transcript import words_of
+
+WORST_FIT = -85.0
+"""Fit below which the transcript is taken to be another sound's; `benchmarks/alignment.py` measures what it refuses."""
+PIECE_S = 15.0
+"""Longer sounds are cut at pauses into pieces of about this length: fitting phones takes memory that grows with the
+square of the length, fitting words only with the length."""
+PAUSE_S = 0.1
+SHORTEST_PHONE_S = 0.005
+QUICKEST_PHONE_S = 0.024
+"""The model cannot say a phone in less."""
+
+Piece = tuple[int, int, tuple[str, ...]]
+"""First sample, sample after the last, words said between them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Phones and words of a sound, each with its time."""
+
+    phones: PhoneTrack
+    """As long as the sound."""
+    words: tuple[Segment, ...]
+    """Word, start and end in seconds."""
+    warnings: tuple[str, ...]
+    """What a person should know: words that were sounded out by rule, stretches that fit badly."""
+    fit: float
+    """How well sound and words fit: about -45 for clear speech, under -85 they do not belong together."""
+
+
+def align(audio: NDArray[np.float32], rate: int, text: str) -> Alignment:
+    """Find when each phone of `text` is said in the sound [S], -1..1, at `rate` Hz.
+
+    Sounds of many minutes are taken piece by piece, cut where the speaker pauses. FacesynthError where the sound
+    is too short or silent, the text holds no words, or the two do not belong together.
+    """
+    require_sound(audio, rate)
+    words = words_of(text)
+    _require_sayable(words, text, len(audio) / rate)
+    pieces = _pieces(audio, rate, words)
+    if pieces is None:
+        raise _mismatch(text)
+    whole = []
+    for start, stop, some in track(pieces, "align"):
+        found = fit_phones(audio[start:stop], rate, some)
+        if found is None:
+            raise _mismatch(text, f"from {start / rate:.1f} to {stop / rate:.1f} s its words are not heard to the end")
+        whole.append(found)
+    fit = float(np.average([found.fit for found in whole], weights=[len(found.words) for found in whole]))
+    if fit < WORST_FIT:
+        raise _mismatch(text, f"fit {fit:.0f}; speech with its own words is above {WORST_FIT:.0f}")
+    starts_s = [start / rate for start, _, _ in pieces]
+    phones = _within(_moved([found.phones for found in whole], starts_s), len(audio) / rate)
+    spoken = _within(_moved([found.words for found in whole], starts_s), len(audio) / rate)
+    warnings = (*_guessed_words(words), *_doubtful(whole, starts_s))
+    return Alignment(phone_track(phones, len(audio) / rate), tuple(spoken), warnings, fit)
+
+
+def _require_sayable(words: Sequence[str], text: str, duration_s: float) -> None:
+    if not words:
+        raise FacesynthError(f"the transcript {_quoted(text)} holds no English word; write what is said, or leave it out")
+    count = sum(min(map(len, pronunciations(word))) for word in words)
+    if count * QUICKEST_PHONE_S > duration_s:
+        raise FacesynthError(
+            f"the transcript {_quoted(text)} does not match the sound: its {count} phones need at least"
+            f" {count * QUICKEST_PHONE_S:.1f} s, the sound lasts {duration_s:.1f} s"
+        )
+
+
+def _pieces(audio: NDArray[np.float32], rate: int, words: tuple[str, ...]) -> list[Piece] | None:
+    """The sound and its words, cut in the middle of pauses into pieces of PIECE_S or somewhat more.
+
+    Where no pause comes for another PIECE_S the cut falls between two words. None where the words cannot be followed
+    through the sound.
+    """
+    if len(audio) / rate < 1.5 * PIECE_S:
+        return [(0, len(audio), words)]
+    timed = fit_words(audio, rate, words)
+    if timed is None:
+        return None
+    pieces: list[Piece] = []
+    start, first = 0, 0
+    for index, ((_, _, end_s), (_, next_s, _)) in enumerate(pairwise(timed), start=1):
+        middle = round((end_s + next_s) / 2 * rate)
+        length_s = (middle - start) / rate
+        if length_s >= 2 * PIECE_S or (length_s >= PIECE_S and next_s - end_s >= PAUSE_S):
+            pieces.append((start, middle, words[first:index]))
+            start, first = middle, index
+    return [*pieces, (start, len(audio), words[first:])]
+
+
+def _mismatch(text: str, reason: str = "its words are not heard to the end") -> FacesynthError:
+    return FacesynthError(
+        f"the transcript {_quoted(text)} does not match the sound ({reason});"
+        " correct the transcript, or leave it out to have the phones recognised"
+    )
+
+
+def _moved(pieces: Iterable[Sequence[Segment]], starts_s: Iterable[float]) -> list[Segment]:
+    """Segments of all pieces, in seconds of the whole sound."""
+    return [
+        (label, start_s + offset_s, end_s + offset_s)
+        for piece, offset_s in zip(pieces, starts_s, strict=True)
+        for label, start_s, end_s in piece
+    ]
+
+
+def _within(segments: Sequence[Segment], duration_s: float) -> list[Segment]:
+    """Segments laid inside the sound: what reaches beyond its ends, or into the piece before, is pressed together.
+
+    Pauses that lie outside go; phones keep at least SHORTEST_PHONE_S, where the sound is long enough for that.
+    """
+    kept = [s for s in segments if s[0] != SILENCE or (s[2] > SHORTEST_PHONE_S and s[1] < duration_s - SHORTEST_PHONE_S)]
+    room = min(SHORTEST_PHONE_S, duration_s / (len(kept) + 1)) * np.arange(len(kept) + 1)
+    ends = np.maximum.accumulate(np.array([s[2] for s in kept]) - room[1:]) + room[1:]
+    ends = np.clip(ends, room[1:], duration_s - room[-2::-1])
+    starts = np.maximum([s[1] for s in kept], np.concatenate([[0.0], ends[:-1]]))
+    starts = np.minimum(starts, ends - room[1])
+    return [(s[0], float(a), float(b)) for s, a, b in zip(kept, starts, ends, strict=True)]
+
+
+def _guessed_words(words: Sequence[str]) -> list[str]:
+    return [
+        f"no dictionary knows {word!r}; it was sounded out as {' '.join(pronounce(word))}"
+        for word in dict.fromkeys(words)
+        if not is_known(word)
+    ]
+
+
+def _doubtful(fitted: Sequence[Fitted], starts_s: Sequence[float]) -> list[str]:
+    """A warning for each piece of a longer sound that alone would have been refused."""
+    return [
+        f"from {start_s + found.words[0][1]:.1f} to {start_s + found.words[-1][2]:.1f} s the transcript does not fit well"
+        for found, start_s in zip(fitted, starts_s, strict=True)
+        if found.fit < WORST_FIT
+    ]
+
+
+def _quoted(text: str) -> str:
+    words = text.split()
+    return repr(" ".join(words[:8]) + (" …" if len(words) > 8 else ""))
