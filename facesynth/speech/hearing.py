@@ -1,0 +1,98 @@
+"""From a file of sound and what is known of it to a `Speech`: the one way in for recorded speech."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+from facesynth.speech.audio import load_audio, require_sound
+from facesynth.speech.emotions import NEUTRAL, read_emotions
+from facesynth.speech.segments import Segment, covering
+from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+from facesynth.speech.textgrid import read_label_lines, read_textgrid
+
+Source = Literal["textgrid", "labels", "transcript", "recognition"]
+
+OVERHANG_S = 0.2
+"""A track of phones that ends later than this after the sound belongs to another sound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """Speech, and how its phones were found."""
+
+    speech: Speech
+    words: tuple[Segment, ...]
+    """Word, start and end in seconds; empty where nobody knows the words."""
+    warnings: tuple[str, ...]
+    source: Source
+    """Where the phones come from."""
+
+
+def hear(
+    audio_path: str | Path,
+    *,
+    text: str | None = None,
+    phones_path: str | Path | None = None,
+    emotion: str | None = None,
+    emotions_path: str | Path | None = None,
+    intensity: float = 1.0,
+) -> Heard:
+    """Read a sound or video file with its phones and emotions; the tracks are exactly as long as the sound.
+
+    Phones come from `phones_path` (a TextGrid, or lines of `end label`), else from the transcript `text` by
+    alignment, else by recognition. Emotions come from the track `emotions_path`, else are one label for the
+    whole (neutral if none is given) at an intensity from 0 to 1. FacesynthError says what cannot be used.
+    """
+    audio, rate = load_audio(audio_path)
+    require_sound(audio, rate)
+    duration_s = len(audio) / rate
+    emotions = _emotions(emotion, emotions_path, intensity, duration_s)
+    phones, words, warnings, source = _phones(audio, rate, text, phones_path)
+    spoken = text if text is not None else " ".join(word for word, _, _ in words)
+    return Heard(Speech(audio, rate, phones, emotions, spoken), words, warnings, source)
+
+
+def _emotions(emotion: str | None, path: str | Path | None, intensity: float, duration_s: float) -> EmotionTrack:
+    if path is not None:
+        return read_emotions(path, duration_s)
+    if not 0 <= intensity <= 1:
+        raise FacesynthError(f"intensity must lie from 0 (neutral) to 1 (as recorded); got {intensity:g}")
+    return EmotionTrack.constant(emotion or NEUTRAL, duration_s, intensity)
+
+
+def _phones(
+    audio: NDArray[np.float32], rate: int, text: str | None, path: str | Path | None
+) -> tuple[PhoneTrack, tuple[Segment, ...], tuple[str, ...], Source]:
+    duration_s = len(audio) / rate
+    if path is not None:
+        grid = Path(path).suffix.lower() in (".textgrid", ".json")
+        phones, words = read_textgrid(path) if grid else (read_label_lines(path), ())
+        return _fitting(phones, duration_s, path), _cut(words, duration_s), (), "textgrid" if grid else "labels"
+    if text is not None:
+        from facesynth.speech.alignment import align
+
+        found = align(audio, rate, text)
+        return found.phones, found.words, found.warnings, "transcript"
+    from facesynth.speech.recognition import recognise
+
+    warning = "nobody gave the words: phones were recognised by ear, a third or more of them wrongly; a transcript helps"
+    return recognise(audio, rate), (), (warning,), "recognition"
+
+
+def _fitting(phones: PhoneTrack, duration_s: float, path: str | Path) -> PhoneTrack:
+    """The track as long as the sound; FacesynthError where it is another sound's."""
+    if phones.duration_s > duration_s + OVERHANG_S:
+        raise FacesynthError(
+            f"{path} ends at {phones.duration_s:.2f} s, the sound at {duration_s:.2f} s; give the phones of this sound"
+        )
+    return covering(phones, duration_s)
+
+
+def _cut(words: tuple[Segment, ...], duration_s: float) -> tuple[Segment, ...]:
+    return tuple((word, start_s, min(end_s, duration_s)) for word, start_s, end_s in words if start_s < duration_s)
