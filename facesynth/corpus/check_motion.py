@@ -17,8 +17,8 @@ MOST_MISSING = 0.2
 """Share of missing samples above which a recording is hardly worth using."""
 LONGEST_FREEZE_S = 1.0
 """A real face is never still for so long, not even in silence."""
-FASTEST_MM_S = 800.0
-"""Lips and jaw reach 300 mm/s in fast speech, lids 500: a marker that is faster was swapped, or knocked."""
+FASTEST_MM_S = 650.0
+"""Lips, jaw and lids stay under 500 mm/s in fast speech: a marker that is faster was swapped, or knocked."""
 FACE_MM = (60.0, 600.0)
 """Largest extent that the points of a face can have, from a mouth alone to head and shoulders."""
 

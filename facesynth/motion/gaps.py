@@ -60,8 +60,8 @@ def fill_gaps(
     short = [gap for gap in gaps if gap.start > 0 and gap.stop < len(frames) and len(gap) <= longest]
     for k in sorted({gap.point for gap in short}):
         _interpolate(points[:, k], ~missing[:, k], [gap for gap in short if gap.point == k])
-    left = tuple(gap for gap in gaps if gap not in short)
-    return points.reshape(frames.shape), GapReport(missing.size, sum(map(len, short)), left)
+    left = sorted(set(gaps) - set(short), key=lambda gap: (gap.point, gap.start))
+    return points.reshape(frames.shape), GapReport(missing.size, sum(map(len, short)), tuple(left))
 
 
 def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:
