@@ -108,7 +108,7 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
     recordings = _recordings(speech)
     if len(recordings) > 1:
         _require_batch(outputs, options)
-    size = _size(options["size"])
+    size = parse_size(options["size"])
     method = load(model)
     results = [_speak_one(method, path, outputs, size, options) for path in recordings]
     if as_json:
@@ -206,7 +206,8 @@ def _require_batch(outputs: list[Path], options: dict[str, Any]) -> None:
             )
 
 
-def _size(text: str) -> tuple[int, int]:
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height from `1280x720`; both even, as H.264 wants them."""
     width, _, height = text.partition("x")
     if (
         not (width.isdigit() and height.isdigit())

@@ -167,11 +167,16 @@ class Efase(Method):
         plan = self.plan(speech)
         return shares(self.nodes(), plan.query, plan.path.nodes)
 
-    def joint_frames(self, speech: Speech) -> np.ndarray:
+    def joins(self, speech: Speech) -> np.ndarray:
         """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
         plan = self.plan(speech)
         labels, bounds = speech.phones.labels, speech.phones.frame_bounds(self.fps)
         return joints(self.nodes(), plan.path.nodes, labels, bounds)
+
+    def rest_of(self, speech: Speech, emotion: str | None = None) -> Floats:
+        """[P, D] the rest pose at each phone, in its emotion or in the one given."""
+        felt = [emotion] * len(speech.phones) if emotion else speech.emotions.per_phone(speech.phones)[0]
+        return self.rest.cpu().numpy().astype(np.float64)[[self._emotion_index(e) for e in felt]]
 
     def with_weights(self, **weights: float) -> Self:
         """The same database under other parameters of the cost, sharing its arrays."""
@@ -223,8 +228,7 @@ class Efase(Method):
 
     def _decode(self, speech: Speech, plan: Plan, emotion: str | None = None) -> Floats:
         labels, bounds = self._phones(speech)
-        felt = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
-        rest = self.rest.cpu().numpy().astype(np.float64)[[self._emotion_index(e) for e in felt]]
+        rest = self.rest_of(speech, emotion)
         fps = self.config["database_fps"]
         coordinates = concatenate(self.nodes(), plan.path.nodes, labels, bounds, rest, fps, self.smoothing)
         return decode(self.pca, coordinates)

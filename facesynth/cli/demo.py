@@ -1,0 +1,118 @@
+"""`facesynth demo`: everything with nothing recorded."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from facesynth.corpus import Corpus
+    from facesynth.methods.method import Method
+    from facesynth.speech.speech import Speech
+
+
+class Clock:
+    """Prints how long each step took."""
+
+    def __init__(self) -> None:
+        self.start = self.last = time.perf_counter()
+        self.seconds: dict[str, float] = {}
+
+    def step(self, name: str, line: str) -> None:
+        """The step `name` is done; print `line` and its seconds."""
+        now = time.perf_counter()
+        self.seconds[name] = now - self.last
+        click.echo(f"[{now - self.start:6.1f} s] {line} ({now - self.last:.1f} s)", err=True)
+        self.last = now
+
+    @property
+    def total_s(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self.start
+
+
+@click.command("demo")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), default=Path("facesynth-demo"), show_default=True
+)
+@click.option("--seed", default=0, show_default=True)
+@click.option("--size", default="1280x720", show_default=True, help="Of the video.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
+    """Build the synthetic performer, train eFASE on it and let it say a sentence that goes through three emotions.
+
+    The performer and the model are kept in the user's cache, so that a second run only speaks.
+    """
+    from facesynth.cli.speak import parse_size
+    from facesynth.face.rig import load_head
+    from facesynth.performer.build import build_performer
+    from facesynth.speaking import Stage, perform, write_performance
+
+    pixels = parse_size(size)
+    clock = Clock()
+    corpus = build_performer("small", seed=seed)
+    clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
+    model, fresh = _trained(corpus, seed)
+    clock.step("train", f"eFASE with {len(model.facts['names'])} motion nodes")
+    speech = _speech(seed)
+    clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
+    rig = load_head()
+    performance = perform(model, speech, rig, Stage(seed=seed))
+    clock.step("motion", f"{len(performance.motion)} frames of motion at {performance.motion.fps:g} fps, on the head")
+    written = [output / f"demo{suffix}" for suffix in (".csv", ".glb", ".npz", ".mp4")]
+    for path in written:
+        write_performance(path, performance, rig, pixels)
+        clock.step(path.suffix, f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+    _report(clock, written, fresh, corpus.path, as_json)
+
+
+def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
+    """The model for this corpus, from the cache or made now, and whether it was made now."""
+    from facesynth import __version__
+    from facesynth.cache import cache_dir
+    from facesynth.methods.registry import create, load
+
+    key = f"demo-efase-{__version__}-{corpus.provenance()['sha256'][:16]}-{seed}.safetensors"
+    path = cache_dir("models") / key
+    if path.exists():
+        return load(path), False
+    model = create("efase").fit(corpus, seed=seed)
+    model.save(path)
+    return model, True
+
+
+def _speech(seed: int) -> Speech:
+    from facesynth.performer.lines import DEMO_LINES, speak_lines
+    from facesynth.speech.alignment import align
+    from facesynth.speech.speech import Speech
+
+    lines = speak_lines(DEMO_LINES, seed=seed)
+    aligned = align(lines.audio, lines.rate, lines.text)
+    track = lines.emotions
+    ends = track.ends_s.copy()
+    ends[-1] = aligned.phones.duration_s
+    return Speech(lines.audio, lines.rate, aligned.phones, replace(track, ends_s=ends), lines.text)
+
+
+def _report(clock: Clock, written: list[Path], fresh: bool, corpus: Path, as_json: bool) -> None:
+    """Both times: of this run, and of the run that had to build everything."""
+    from facesynth.atomic import write_text
+    from facesynth.cache import cache_dir
+
+    kept = cache_dir("models") / "demo-seconds.json"
+    if fresh:
+        write_text(kept, json.dumps({"first_run_s": clock.total_s}))
+    first = json.loads(kept.read_text(encoding="utf-8"))["first_run_s"] if kept.exists() else None
+    facts: dict[str, Any] = {"seconds": clock.total_s, "first_run_s": first, "steps_s": clock.seconds}
+    facts |= {"written": [str(path) for path in written], "corpus": str(corpus), "synthetic": True}
+    if as_json:
+        click.echo(json.dumps(facts))
+        return
+    again = "" if fresh or first is None else f"; the first run, which built everything, took {first:.1f} s"
+    click.echo(f"done in {clock.total_s:.1f} s{again}")
+    click.echo(f"watch {written[-1]}; the synthetic performer's recordings are in {corpus}")

@@ -1,0 +1,232 @@
+"""Search of the cost's parameters on sentences that are not in the database (Deng 2006, §5.3.6).
+
+The error is piecewise constant in the parameters (the path changes or it does not), so there is no
+gradient: differential evolution (SciPy) over the logarithms of PNT and of the seven weights. Every
+evaluation is kept in a file; a search that was interrupted and is started again with the same seed
+takes from there what is done and goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.optimize import differential_evolution
+from tqdm import tqdm
+
+from facesynth.corpus import Corpus, Record, Utterance
+from facesynth.errors import FacesynthError
+from facesynth.methods.efase.concatenation import concatenate
+from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.nodes import Floats
+from facesynth.motion.resample import resample
+
+RANGES: dict[str, tuple[float, float]] = {
+    "penalty": (1.0, 100.0),
+    "alpha": (0.3, 30.0),
+    "beta": (0.05, 50.0),
+    "eta": (0.05, 50.0),
+    "gamma": (0.03, 1.0),
+    "delta": (0.03, 3.0),
+    "phi": (0.01, 1.0),
+}
+"""Where each setting of eFASE is looked for; all are searched by their logarithm."""
+PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
+"""Deng 2006; PNT is ours, the dissertation gives none."""
+CROWD = 4
+"""Members of the population for each setting."""
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A sentence to imitate, in the model's coordinates."""
+
+    utterance: Utterance
+    truth: Floats
+    """[T, D] at the database's rate; NaN where the recording has a gap."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What a search found."""
+
+    settings: dict[str, float]
+    error: float
+    """On the tuning sentences, mean over sentences, squared unit of the layout."""
+    evaluations: int
+    tuning_sentences: tuple[str, ...]
+    test_sentences: tuple[str, ...]
+    test_error: float
+    published_test_error: float
+
+
+def split_for_tuning(corpus: Corpus, tuning: int, test: int, seed: int) -> tuple[Corpus, Corpus, Corpus]:
+    """(database, tuning, test): utterances of disjoint sentences, evenly over the emotions."""
+    chosen: list[list[str]] = [[], []]
+    taken: set[str] = set()
+    order = np.random.default_rng(seed).permutation(len(corpus.usable_records))
+    for place, count in enumerate((tuning, test)):
+        for number in range(count):
+            emotion = corpus.emotions[number % len(corpus.emotions)]
+            record = next((r for r in _in_order(corpus, order) if r.emotion == emotion and r.sentence not in taken), None)
+            record = record or next((r for r in _in_order(corpus, order) if r.sentence not in taken), None)
+            if record is None:
+                raise FacesynthError(
+                    f"{tuning} + {test} sentences were asked for; the corpus has only {len(taken)} different ones"
+                )
+            taken.add(record.sentence)
+            chosen[place].append(record.id)
+    rest = [r.id for r in corpus.usable_records if r.sentence not in taken]
+    return corpus.subset(rest), corpus.subset(chosen[0]), corpus.subset(chosen[1])
+
+
+def tune(
+    model: Efase, tuning: Corpus, test: Corpus, *, journal: str | Path, generations: int = 10, seed: int = 0, workers: int = 1
+) -> Tuning:
+    """Find settings for a model whose database holds neither `tuning` nor `test`.
+
+    `generations` of CROWD × 7 evaluations each follow the first one. journal: a file of JSON lines,
+    one for each evaluation, which makes the search resumable; it belongs to one model and seed.
+    """
+    kept = _Journal(Path(journal), {"seed": seed, "corpus": model.provenance.get("sha256"), "sentences": list(tuning.ids)})
+    bounds = [(np.log(low), np.log(high)) for low, high in RANGES.values()]
+    total = CROWD * len(RANGES) * (generations + 1)
+    with TemporaryDirectory() as folder, _Workers(model, tuning, kept, workers, total, Path(folder)) as pool:
+        found = differential_evolution(
+            pool.error_of,
+            bounds,
+            maxiter=generations,
+            popsize=CROWD,
+            updating="deferred",
+            workers=pool.map,
+            polish=False,
+            tol=0,
+            seed=seed,
+        )
+    settings = {name: float(np.exp(value)) for name, value in zip(RANGES, found.x, strict=True)}
+    examples = examples_of(model, test)
+    return Tuning(
+        settings,
+        float(found.fun),
+        len(kept.errors),
+        tuple(tuning.ids),
+        tuple(test.ids),
+        mean_error(model.with_weights(**settings), examples),
+        mean_error(model.with_weights(**PUBLISHED), examples),
+    )
+
+
+def examples_of(model: Efase, corpus: Corpus) -> list[Example]:
+    """The utterances of a corpus, ready to be compared with."""
+    fps = model.config["database_fps"]
+    motions = [(utterance, resample(utterance.motion, fps)) for utterance in corpus]
+    return [Example(u, model.pca.encode(torch.from_numpy(m.frames)).numpy().astype(np.float64)) for u, m in motions]
+
+
+def mean_error(model: Efase, examples: Iterable[Example]) -> float:
+    """Mean over sentences of eq. 13 of Deng 2008, in PCA space, where squared distances are those over markers."""
+    nodes, fps = model.nodes(), model.config["database_fps"]
+    points = len(model.fitted_layout.names)
+    errors = []
+    for example in examples:
+        speech = example.utterance.speech
+        plan, bounds = model.plan(speech), speech.phones.frame_bounds(fps)
+        rest = model.rest_of(speech)
+        made = concatenate(nodes, plan.path.nodes, speech.phones.labels, bounds, rest, fps, model.smoothing)
+        count = min(len(made), len(example.truth))
+        errors.append(np.nanmean(((made[:count] - example.truth[:count]) ** 2).sum(axis=1)) / points)
+    return float(np.mean(errors))
+
+
+def _in_order(corpus: Corpus, order: np.ndarray) -> Iterator[Record]:
+    return (corpus.usable_records[i] for i in order)
+
+
+class _Journal:
+    """Errors by settings, in a file that only grows."""
+
+    def __init__(self, path: Path, about: dict[str, Any]) -> None:
+        self.path, self.errors = path, dict[str, float]()
+        if path.exists():
+            lines = path.read_text(encoding="utf-8").splitlines()
+            if not lines or json.loads(lines[0]) != about:
+                raise FacesynthError(f"{path} belongs to another search; give another file, or remove it")
+            self.errors = {row["key"]: row["error"] for row in map(_complete, lines[1:]) if row}
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(about) + "\n", encoding="utf-8")
+
+    def keep(self, key: str, error: float) -> None:
+        self.errors[key] = error
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"key": key, "error": error}) + "\n")
+
+
+def _complete(line: str) -> dict[str, Any]:
+    """A line of the journal, or nothing for one that an interruption cut."""
+    try:
+        return json.loads(line)
+    except ValueError:
+        return {}
+
+
+class _Workers:
+    """Evaluates populations, in processes where more than one is wanted; the result does not depend on their number."""
+
+    def __init__(self, model: Efase, corpus: Corpus, journal: _Journal, workers: int, total: int, folder: Path) -> None:
+        self.model, self.corpus, self.journal, self.workers, self.folder = model, corpus, journal, workers, folder
+        self.bar = tqdm(total=total, desc="tuning", disable=None, leave=False)
+        self.examples = examples_of(model, corpus) if workers == 1 else []
+        self.pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> _Workers:
+        if self.workers > 1:
+            path = self.folder / "model.safetensors"
+            self.model.save(path)
+            arguments = (str(path), str(self.corpus.path), self.corpus.ids)
+            self.pool = ProcessPoolExecutor(self.workers, get_context("spawn"), _start_worker, arguments)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.close()
+        if self.pool:
+            self.pool.shutdown(cancel_futures=True)
+
+    def error_of(self, point: Floats) -> float:
+        return next(self.map(None, [point]))
+
+    def map(self, _: Callable | None, points: Iterable[Floats]) -> Any:
+        points = list(points)
+        keys = [json.dumps([round(float(v), 12) for v in point]) for point in points]
+        missing = [i for i, key in enumerate(keys) if key not in self.journal.errors]
+        jobs = [{name: float(np.exp(v)) for name, v in zip(RANGES, points[i], strict=True)} for i in missing]
+        errors = self.pool.map(_work, jobs) if self.pool else (self._error(job) for job in jobs)
+        for i, error in zip(missing, errors, strict=True):
+            self.journal.keep(keys[i], error)
+            self.bar.update()
+        return iter([self.journal.errors[key] for key in keys])
+
+    def _error(self, settings: dict[str, float]) -> float:
+        return mean_error(self.model.with_weights(**settings), self.examples)
+
+
+_WORKER: dict[str, Any] = {}
+
+
+def _start_worker(model_path: str, corpus_path: str, ids: tuple[str, ...]) -> None:
+    torch.set_num_threads(1)
+    model = Efase.load(model_path)
+    _WORKER["model"] = model
+    _WORKER["examples"] = examples_of(model, Corpus.open(corpus_path).subset(ids))
+
+
+def _work(settings: dict[str, float]) -> float:
+    return mean_error(_WORKER["model"].with_weights(**settings), _WORKER["examples"])
