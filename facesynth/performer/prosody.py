@@ -6,12 +6,13 @@ about the emotion; and every take differs from the last in tempo, pitch and loud
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from facesynth.errors import FacesynthError, unknown
@@ -64,6 +65,8 @@ class Analysis:
     """[F, B] power envelope."""
     aperiodicity: NDArray[np.float64]
     """[F, B] 0 (periodic) to 1 (noise)."""
+    audio: NDArray[np.float32]
+    """[S] the sound itself."""
     rate: int
     """Hz of the sound."""
 
@@ -75,7 +78,7 @@ def analyse(audio: NDArray[np.float32], rate: int) -> Analysis:
     pitch, times = pyworld.harvest(sound, rate, f0_floor=65.0, f0_ceil=400.0, frame_period=1000 * FRAME_S)
     spectrum = pyworld.cheaptrick(sound, pitch, times, rate)
     aperiodicity = pyworld.d4c(sound, pitch, times, rate)
-    return Analysis(pitch, spectrum, aperiodicity, rate)
+    return Analysis(pitch, spectrum, aperiodicity, np.asarray(audio, np.float32), rate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,18 @@ class Voiced:
     """Hz."""
     pitch_hz: NDArray[np.float64]
     """[F] every 5 ms, 0 where unvoiced."""
+    calm_frames: NDArray[np.float64]
+    """[F] which frame of the calm speech is heard in each frame."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the sound, seconds."""
+        return len(self.audio) / self.rate
+
+    def when(self, calm_s: ArrayLike) -> NDArray[np.float64]:
+        """When a moment of the calm speech (seconds) comes in this one (seconds)."""
+        frames = np.asarray(calm_s, np.float64) / FRAME_S
+        return np.interp(frames, self.calm_frames, np.arange(len(self.calm_frames))) * FRAME_S
 
 
 def colour(analysis: Analysis, emotion: str, seed: int) -> Voiced:
@@ -102,7 +117,7 @@ def colour(analysis: Analysis, emotion: str, seed: int) -> Voiced:
     aperiodicity = np.clip(_at(analysis.aperiodicity, frames), 0.0, 1.0)
     pyworld = _pyworld()
     sound = pyworld.synthesize(pitch, np.ascontiguousarray(spectrum), aperiodicity, analysis.rate, 1000 * FRAME_S)
-    return Voiced(_as_recorded(sound, prosody.loudness_db, rng), analysis.rate, pitch)
+    return Voiced(_as_recorded(sound, prosody.loudness_db, rng), analysis.rate, pitch, frames)
 
 
 def _as_taken(prosody: Prosody, rng: np.random.Generator) -> Prosody:
@@ -172,7 +187,9 @@ def _as_recorded(sound: NDArray[np.float64], loudness_db: float, rng: np.random.
 
 def _pyworld() -> ModuleType:
     try:
-        import pyworld
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "pkg_resources is deprecated", UserWarning)
+            import pyworld
     except ImportError as error:
         raise FacesynthError(f"pyworld cannot be imported ({error}); pip install 'facesynth[demo]'") from None
     return pyworld

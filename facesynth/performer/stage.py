@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facesynth.errors import FacesynthError
 from facesynth.face.markers import LipGap
@@ -38,10 +37,20 @@ class Recording:
     """Why it cannot be used; empty if it can."""
 
 
+@dataclass(frozen=True, eq=False)
+class Said:
+    """A sentence in the calm voice, with its phones; all takes are made of it."""
+
+    calm: Analysis
+    phones: PhoneTrack
+    words: tuple[Segment, ...]
+    unusable: str
+
+
 def record_takes(takes: Sequence[Take], seed: int, clean: bool) -> list[Recording]:
-    """Record takes of one sentence; it is said and taken apart once, and then coloured for each."""
-    calm = calm_speech(takes[0].sentence.text)
-    return [_record(take, calm, seed, clean) for take in takes]
+    """Record takes of one sentence; it is said, taken apart and aligned once, and then coloured for each."""
+    said = _say(takes[0].sentence.text)
+    return [_record(take, said, seed, clean) for take in takes]
 
 
 def calm_speech(text: str, before_s: float = PAUSE_S, after_s: float = PAUSE_S) -> Analysis:
@@ -50,32 +59,37 @@ def calm_speech(text: str, before_s: float = PAUSE_S, after_s: float = PAUSE_S) 
     return analyse(np.pad(audio, (round(before_s * rate), round(after_s * rate))), rate)
 
 
-def _record(take: Take, calm: Analysis, seed: int, clean: bool) -> Recording:
+def _say(text: str) -> Said:
+    """Phones and words as our own aligner hears them; a sentence that cannot be aligned stays, marked as unusable."""
+    from facesynth.speech.alignment import align
+
+    calm = calm_speech(text)
+    try:
+        alignment = align(calm.audio, calm.rate, text)
+    except FacesynthError as error:
+        silence = PhoneTrack((SILENCE,), np.array([len(calm.audio) / calm.rate]))
+        return Said(calm, silence, (), f"not aligned: {error}")
+    return Said(calm, alignment.phones, tuple(alignment.words), "")
+
+
+def _record(take: Take, said: Said, seed: int, clean: bool) -> Recording:
     rig, lips = _head()
     voice_seed, acting_seed, recording_seed = take.seeds(seed)
-    voiced = colour(calm, take.emotion, voice_seed)
-    phones, words, unusable = _aligned(voiced, take.sentence.text)
+    voiced = colour(said.calm, take.emotion, voice_seed)
+    phones, words = _coloured(said, voiced)
     emotions = EmotionTrack.constant(take.emotion, phones.duration_s)
     speech = Speech(voiced.audio, voiced.rate, phones, emotions, take.sentence.text)
     performance = perform(speech, lips, pitch_hz=voiced.pitch_hz, fps=FPS, seed=acting_seed)
     recorded = capture(performance, phones, rig, rng=np.random.default_rng(recording_seed), clean=clean)
-    return Recording(take, speech, words, recorded, unusable)
+    return Recording(take, speech, words, recorded, said.unusable)
 
 
-def _aligned(voiced: Voiced, text: str) -> tuple[PhoneTrack, tuple[Segment, ...], str]:
-    """Phones and words as our own aligner hears them; a take that cannot be aligned stays, marked as unusable."""
-    from facesynth.speech.alignment import align
-
-    try:
-        alignment = align(voiced.audio, voiced.rate, text)
-    except FacesynthError as error:
-        silence = PhoneTrack((SILENCE,), _ends(len(voiced.audio) / voiced.rate))
-        return silence, (), f"not aligned: {error}"
-    return alignment.phones, tuple(alignment.words), ""
-
-
-def _ends(*ends_s: float) -> NDArray[np.float64]:
-    return np.array(ends_s, np.float64)
+def _coloured(said: Said, voiced: Voiced) -> tuple[PhoneTrack, tuple[Segment, ...]]:
+    """Phones and words of a take: those of the calm speech, at the times to which its colouring moved them."""
+    ends = voiced.when(said.phones.ends_s)
+    ends[-1] = voiced.duration_s
+    words = tuple((word, *voiced.when((start, end)).tolist()) for word, start, end in said.words)
+    return PhoneTrack(said.phones.labels, ends), words
 
 
 @cache
