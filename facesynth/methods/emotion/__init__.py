@@ -1,0 +1,1 @@
+"""Which emotion a voice carries (Cao 2005, §6)."""

@@ -1,0 +1,141 @@
+"""What a voice does over time: timbre, loudness, pitch and colour, a hundred times a second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+
+RATE = 16000
+HOP = 160
+WINDOW, FFT = 400, 512
+PITCH_WINDOW, PITCH_FFT = 800, 2048
+LOWEST_HZ, HIGHEST_HZ = 65, 500
+OCTAVE_COST = 0.02
+"""What an octave down costs a pitch candidate, in units of the autocorrelation: the highest good one wins."""
+VOICED = 0.55
+"""Autocorrelation from which a frame counts as voiced."""
+QUIETER_DB = 35.0
+"""Frames this far under the loudest one are silence where an utterance begins and ends."""
+LEAST_FRAMES = 10
+SMALLEST_POWER = 1e-8
+BANDS = 40
+
+Floats = NDArray[np.float64]
+_FREQUENCIES = np.arange(FFT // 2 + 1) * RATE / FFT
+
+
+@dataclass(frozen=True, eq=False)
+class Contours:
+    """T frames at 100 Hz, silence at both ends left out."""
+
+    bands: Floats
+    """[T, 40] logarithm of the power in mel bands."""
+    cepstra: Floats
+    """[T, 20] mel-frequency cepstra."""
+    level: Floats
+    """[T] level relative to the loudest frame, in 10 dB."""
+    pitch: Floats
+    """[T] octaves above 100 Hz, meaningful where voiced."""
+    periodicity: Floats
+    """[T] autocorrelation at the pitch period, about 0 (noise) to 1."""
+    voiced: NDArray[np.bool_]
+    """[T] true for at least five frames."""
+    colour: Floats
+    """[T, 8] centroid, slopes and roll-off of the spectrum, its flux and zero crossings."""
+
+
+def contours(audio: Floats) -> Contours:
+    """Contours of audio [S] at 16 kHz; FacesynthError where it is constant or too short."""
+    if len(audio) < LEAST_FRAMES * HOP or float(np.ptp(audio)) < 1e-4:
+        what = "constant (silence?)" if len(audio) >= LEAST_FRAMES * HOP else f"only {len(audio) / RATE * 1000:.0f} ms long"
+        raise FacesynthError(
+            f"the sound is {what}; to detect an emotion, somebody must speak for at least {LEAST_FRAMES * 10} ms"
+        )
+    framed = _frames(audio, WINDOW)
+    power = np.square(np.abs(np.fft.rfft(framed * np.hamming(WINDOW), FFT)))
+    level = np.log10(power.sum(axis=1) + 10 * SMALLEST_POWER)
+    loud = np.flatnonzero(level > level.max() - QUIETER_DB / 10)
+    kept = slice(loud[0], max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
+    bands = np.log(power[kept] @ mel_bands() + SMALLEST_POWER)
+    pitch, periodicity = _pitch(_frames(audio, PITCH_WINDOW)[kept])
+    voiced = periodicity > VOICED
+    if voiced.sum() < 5:
+        voiced = periodicity >= np.sort(periodicity)[-5]
+    return Contours(
+        bands,
+        mel_cepstra(bands),
+        level[kept] - level.max(),
+        _one_octave(pitch, voiced),
+        periodicity,
+        voiced,
+        _colour(framed[kept], power[kept], bands),
+    )
+
+
+def _frames(audio: Floats, length: int) -> Floats:
+    """[1 + S // HOP, length] frames centred on multiples of the hop."""
+    padded = np.pad(audio, (length // 2, length))
+    return np.lib.stride_tricks.sliding_window_view(padded, length)[::HOP][: 1 + len(audio) // HOP]
+
+
+def mel_bands() -> Floats:
+    """[257, 40] triangles, evenly spaced in mel from 50 Hz to 8 kHz."""
+    low, high = (2595 * np.log10(1 + f / 700) for f in (50, RATE / 2))
+    edges = 700 * (10 ** (np.linspace(low, high, BANDS + 2) / 2595) - 1)
+    rise = (_FREQUENCIES[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
+    fall = (edges[2:] - _FREQUENCIES[:, None]) / (edges[2:] - edges[1:-1])
+    return np.maximum(0, np.minimum(rise, fall))
+
+
+def mel_cepstra(bands: Floats) -> Floats:
+    """[T, 40] log mel bands to [T, 20] cepstra."""
+    from scipy.fft import dct
+
+    return dct(bands, type=2, norm="ortho", axis=1)[:, :20]
+
+
+def _pitch(framed: Floats) -> tuple[Floats, Floats]:
+    """Octaves above 100 Hz and periodicity [T], by the autocorrelation divided by the window's own (Boersma 1993)."""
+    window = np.hanning(PITCH_WINDOW)
+    own = _autocorrelation(window[None])[0]
+    found = _autocorrelation((framed - framed.mean(axis=1, keepdims=True)) * window)
+    found = found / np.maximum(found[:, :1], 1e-9) / (own / own[0])
+    shortest, longest = RATE // HIGHEST_HZ, RATE // LOWEST_HZ
+    lags = np.arange(shortest, longest)
+    best = (found[:, lags] - OCTAVE_COST * np.log2(lags / shortest)).argmax(axis=1)
+    return np.log2(RATE / lags[best] / 100), found[np.arange(len(found)), lags[best]]
+
+
+def _autocorrelation(windowed: Floats) -> Floats:
+    return np.fft.irfft(np.square(np.abs(np.fft.rfft(windowed, PITCH_FFT))))[:, :PITCH_WINDOW]
+
+
+def _one_octave(pitch: Floats, voiced: NDArray[np.bool_]) -> Floats:
+    """Octave errors undone: what lies over an octave from the median is brought nearer by one."""
+    middle = np.median(pitch[voiced])
+    return pitch - (pitch > middle + 1) + (pitch < middle - 1)
+
+
+def _colour(framed: Floats, power: Floats, bands: Floats) -> Floats:
+    total = power.sum(axis=1) + 10 * SMALLEST_POWER
+    centroid = power @ _FREQUENCIES / total
+    bright = _band(power, 1000, 5000) - _band(power, 50, 1000)
+    peaks = [np.log10(power[:, _between(*edges)].max(axis=1) + SMALLEST_POWER) for edges in ((0, 2000), (2000, 5000))]
+    tilt = _band(power, 500, 1500) - _band(power, 0, 500)
+    hiss = _band(power, 3000, 8001) - _band(power, 50, 3000)
+    roll_off = _FREQUENCIES[(np.cumsum(power, axis=1) >= 0.85 * power.sum(axis=1, keepdims=True)).argmax(axis=1)]
+    flux = np.concatenate([[0.0], np.sqrt(np.square(np.diff(bands, axis=0)).mean(axis=1))])
+    crossings = np.diff(np.signbit(framed), axis=1).mean(axis=1)
+    return np.stack([centroid, bright, peaks[0] - peaks[1], tilt, hiss, roll_off, flux, crossings], axis=1)
+
+
+def _between(low_hz: float, high_hz: float) -> NDArray[np.bool_]:
+    return (low_hz <= _FREQUENCIES) & (high_hz > _FREQUENCIES)
+
+
+def _band(power: Floats, low_hz: float, high_hz: float) -> Floats:
+    return np.log10(power[:, _between(low_hz, high_hz)].sum(axis=1) + SMALLEST_POWER)

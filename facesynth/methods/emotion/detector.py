@@ -1,0 +1,254 @@
+"""Speech in, emotion out: for a whole utterance or along time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from facesynth.atomic import atomic_path
+from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.emotion.paper_features import paper_features
+from facesynth.methods.emotion.svm import Kernel, Svm, SvmSettings
+from facesynth.methods.emotion.voice_features import voice_features
+from facesynth.progress import track
+from facesynth.speech.audio import resample
+from facesynth.speech.speech import EmotionTrack
+
+RATE = 16000
+FORMAT = 1
+FEATURES = ("voice", "paper")
+SMALLEST_SPREAD = 1e-9
+LEAST_OF_A_SPEAKER = 4
+"""Recordings from which a speaker's own mean and spread are taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A recording of one emotion."""
+
+    audio: NDArray[np.float32]
+    """[S] mono."""
+    rate: int
+    """Hz."""
+    emotion: str
+    speaker: str = ""
+    sentence: str = ""
+
+
+@dataclass(frozen=True)
+class DetectorSettings:
+    """What a detector is made of; the keys of configs/emotion.yaml.
+
+    `features` is `voice` (187 statistics of timbre, pitch, dynamics and rhythm) or `paper` (three moments and
+    `coefficients` of the cepstrum). `normalise`: every speaker's features are brought to that speaker's own mean and
+    spread, over all of the speaker's recordings; a new speaker then needs some too.
+    """
+
+    features: Literal["voice", "paper"] = "voice"
+    coefficients: int = 500
+    kernel: Kernel = "radial"
+    formulation: Literal["C", "nu"] = "C"
+    cost: float = 3.0
+    nu: float = 0.5
+    normalise: bool = False
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was heard in a sound."""
+
+    emotion: str
+    """The decision of the pairwise votes."""
+    probabilities: dict[str, float]
+    """Of each emotion; the largest may be another than the decision."""
+
+
+class EmotionDetector(nn.Module):
+    """Features, scaling and a support vector machine."""
+
+    shift: Tensor
+    """[F] subtracted from the features."""
+    scale: Tensor
+    """[F] and then multiplied."""
+
+    def __init__(self, settings: DetectorSettings | None = None) -> None:
+        super().__init__()
+        self.settings = settings or DetectorSettings()
+        if self.settings.features not in FEATURES:
+            raise unknown("feature set", self.settings.features, FEATURES)
+        self.emotions: tuple[str, ...] = ()
+        self.provenance: dict[str, Any] = {}
+
+    def features(self, audio: NDArray[Any], rate: int) -> NDArray[np.float64]:
+        """Audio [S] to features [F]; FacesynthError where it is constant or too short."""
+        sound = resample(np.asarray(audio, np.float32), rate, RATE).astype(np.float64)
+        if self.settings.features == "voice":
+            return voice_features(sound)
+        if not len(sound) or float(np.ptp(sound)) < 1e-4:
+            raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
+        return paper_features(sound, self.settings.coefficients)
+
+    def features_of(self, clips: Sequence[Clip]) -> NDArray[np.float64]:
+        """[N, F] features of many recordings."""
+        return np.array([self.features(c.audio, c.rate) for c in track(clips, "features", len(clips))])
+
+    def fit(self, clips: Sequence[Clip]) -> Self:
+        """Learn from recordings of at least two emotions."""
+        return self.fit_features(self.features_of(clips), clips)
+
+    def fit_features(self, x: NDArray[np.float64], clips: Sequence[Clip]) -> Self:
+        """The same, from features [N, F] that were computed before."""
+        emotions = sorted({clip.emotion for clip in clips})
+        if len(emotions) < 2:
+            raise FacesynthError(f"detection needs recordings of at least two emotions; got {', '.join(emotions) or 'none'}")
+        speakers = np.array([clip.speaker for clip in clips])
+        if self.settings.normalise:
+            x = by_speaker(x, speakers)
+        self._fit_scaling(x)
+        y = np.array([emotions.index(clip.emotion) for clip in clips])
+        groups = speakers if len(set(speakers.tolist())) > 1 else np.array([clip.sentence for clip in clips])
+        chosen = {f.name: getattr(self.settings, f.name) for f in fields(SvmSettings)}
+        self.machine = Svm.fit(self._scaled(torch.from_numpy(x)).numpy(), y, SvmSettings(**chosen), groups)
+        self.emotions = tuple(emotions)
+        return self.eval()
+
+    def _fit_scaling(self, x: NDArray[np.float64]) -> None:
+        """The paper's features to [-1, 1]; the voice's, of many shapes, to mean 0 and spread 1."""
+        if self.settings.features == "paper":
+            low, high = x.min(axis=0), x.max(axis=0)
+            shift, spread = (low + high) / 2, (high - low) / 2
+        else:
+            shift, spread = x.mean(axis=0), x.std(axis=0)
+        scale = np.where(spread > SMALLEST_SPREAD, 1 / np.maximum(spread, SMALLEST_SPREAD), 0)
+        self.register_buffer("shift", torch.from_numpy(shift))
+        self.register_buffer("scale", torch.from_numpy(scale))
+
+    def _scaled(self, x: Tensor) -> Tensor:
+        return (x.to(torch.float64) - self.shift) * self.scale
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Features [..., F] to probabilities [..., K]."""
+        return self.machine(self._scaled(x))
+
+    def decide(self, x: NDArray[np.float64]) -> NDArray[np.str_]:
+        """Features [N, F] to the emotion that wins most pairs [N]."""
+        return np.array(self.emotions)[self.machine.decide(self._scaled(torch.from_numpy(x))).numpy()]
+
+    def detect(self, audio: NDArray[Any], rate: int, speaker: NDArray[np.float64] | None = None) -> Reading:
+        """The emotion of a whole sound [S].
+
+        speaker: features [N, F] of recordings of the same speaker in mixed emotions (`features_of`, or a minute of
+        speech cut into pieces); a detector that normalises needs them.
+        """
+        x = self._of_speaker(self.features(audio, rate)[None], speaker)
+        probabilities = self(torch.from_numpy(x))[0].tolist()
+        return Reading(str(self.decide(x)[0]), dict(zip(self.emotions, probabilities, strict=True)))
+
+    def detect_track(
+        self,
+        audio: NDArray[Any],
+        rate: int,
+        *,
+        window_s: float = 2.0,
+        hop_s: float = 0.5,
+        speaker: NDArray[np.float64] | None = None,
+    ) -> EmotionTrack:
+        """Emotions along time: the most probable one of the windows that cover each moment."""
+        duration_s = len(audio) / rate
+        if not 0 < hop_s <= window_s:
+            raise FacesynthError(
+                f"windows must be at least as long as their step and both positive; got {window_s} and {hop_s} s"
+            )
+        count = max(1, int(np.ceil((duration_s - window_s) / hop_s)) + 1)
+        starts = np.minimum(np.arange(count) * hop_s, max(0.0, duration_s - window_s))
+        pieces = [audio[round(s * rate) : round((s + window_s) * rate)] for s in starts]
+        x = [self._quiet_or_features(piece, rate) for piece in pieces]
+        heard = [k for k, features in enumerate(x) if features is not None]
+        if not heard:
+            raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
+        known = np.array([x[k] for k in heard])
+        probabilities = self(torch.from_numpy(self._of_speaker(known, speaker))).numpy()
+        return self._as_track(starts[heard], probabilities, window_s, hop_s, duration_s)
+
+    def _quiet_or_features(self, piece: NDArray[Any], rate: int) -> NDArray[np.float64] | None:
+        try:
+            return self.features(piece, rate)
+        except FacesynthError:
+            return None
+
+    def _as_track(self, starts: NDArray[np.float64], probabilities: NDArray[np.float64], *times_s: float) -> EmotionTrack:
+        window_s, hop_s, duration_s = times_s
+        ends = np.append(np.arange(hop_s, duration_s - hop_s / 2, hop_s), duration_s)
+        middles = ends - hop_s / 2
+        covering = np.abs(starts + window_s / 2 - middles[:, None]) <= window_s / 2
+        covering |= np.abs(starts + window_s / 2 - middles[:, None]).argmin(axis=1)[:, None] == np.arange(len(starts))
+        best = (covering @ probabilities).argmax(axis=1)
+        last = np.append(np.flatnonzero(np.diff(best)), len(best) - 1)
+        return EmotionTrack(tuple(self.emotions[k] for k in best[last]), ends[last], np.ones(len(last)))
+
+    def _of_speaker(self, x: NDArray[np.float64], speaker: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        if not self.emotions:
+            raise FacesynthError("this emotion detector is not trained; call fit(clips) or load(path) first")
+        if not self.settings.normalise:
+            return x
+        if speaker is None or len(speaker) < LEAST_OF_A_SPEAKER:
+            raise FacesynthError(
+                f"this detector compares a speaker with that speaker's own average: give it at least {LEAST_OF_A_SPEAKER} "
+                f"recordings of the speaker in mixed emotions; got {0 if speaker is None else len(speaker)}"
+            )
+        return (x - speaker.mean(axis=0)) / (speaker.std(axis=0) + SMALLEST_SPREAD)
+
+    def save(self, path: str | Path) -> None:
+        """Write one safetensors file, atomically."""
+        if not self.emotions:
+            raise FacesynthError("this emotion detector is not trained; there is nothing to save")
+        header = {
+            "settings": asdict(self.settings),
+            "emotions": self.emotions,
+            "provenance": self.provenance,
+            "format": FORMAT,
+        }
+        tensors = {key: value.contiguous() for key, value in self.state_dict().items()}
+        with atomic_path(path) as part:
+            save_file(tensors, part, metadata={"facesynth_emotion": json.dumps(header, sort_keys=True)})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote; FacesynthError for any other file."""
+        if not Path(path).is_file():
+            raise FacesynthError(f"{path}: no such emotion detector; train one with train/emotion.py")
+        try:
+            with safe_open(path, "pt") as file:
+                text = (file.metadata() or {}).get("facesynth_emotion")
+                tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+        except (SafetensorError, OSError) as error:
+            raise FacesynthError(f"{path} is not an emotion detector, or is truncated ({error})") from None
+        header = json.loads(text) if text else {}
+        if header.get("format") != FORMAT:
+            raise FacesynthError(f"{path} is not an emotion detector of format {FORMAT}; train it again")
+        detector = cls(DetectorSettings(**header["settings"]))
+        detector.emotions, detector.provenance = tuple(header["emotions"]), header["provenance"]
+        detector.machine = Svm(len(detector.emotions), detector.settings.kernel)
+        for key, value in tensors.items():
+            owner, _, leaf = key.rpartition(".")
+            detector.get_submodule(owner).register_buffer(leaf, value)
+        return detector.eval()
+
+
+def by_speaker(x: NDArray[np.float64], speakers: NDArray[Any]) -> NDArray[np.float64]:
+    """Features [N, F] of mean 0 and spread 1 for each speaker [N]."""
+    result = np.empty_like(x)
+    for speaker in np.unique(speakers):
+        own = x[speakers == speaker]
+        result[speakers == speaker] = (own - own.mean(axis=0)) / (own.std(axis=0) + SMALLEST_SPREAD)
+    return result

@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+import soundfile
+import torch
+
+from facesynth.errors import FacesynthError
+from facesynth.methods.emotion.contours import contours
+from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
+from facesynth.methods.emotion.paper_features import paper_features
+from facesynth.methods.emotion.voice_features import voice_features
+from facesynth.speech.audio import resample
+
+RATE = 16000
+MOODS = {"calm": (110, 2.5, 0.02), "excited": (210, 6.0, 0.3)}
+
+
+def voice(mood, seed, seconds=1.2, level=0.2):
+    """Buzz with a pitch, a syllable rate and some breath; who speaks changes the pitch a little."""
+    rng = np.random.default_rng(seed)
+    pitch_hz, syllables_hz, breath = MOODS[mood]
+    t = np.arange(round(seconds * RATE)) / RATE
+    pitch = pitch_hz * rng.uniform(0.9, 1.1) * (1 + 0.1 * np.sin(2 * np.pi * 1.5 * t + rng.uniform(0, 6)))
+    buzz = sum(np.sin(k * 2 * np.pi * np.cumsum(pitch) / RATE) / k for k in range(1, 12))
+    envelope = 0.5 + 0.5 * np.sin(2 * np.pi * syllables_hz * t)
+    return (level * envelope * (buzz / 2 + breath * rng.normal(size=len(t)))).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def clips():
+    return [
+        Clip(voice(mood, 10 * s + k), RATE, mood, f"speaker{s}", f"s{k}") for mood in MOODS for s in range(3) for k in range(5)
+    ]
+
+
+@pytest.fixture(scope="module")
+def detector(clips):
+    return EmotionDetector().fit(clips)
+
+
+def test_pitch_of_a_buzz():
+    found = contours(voice("excited", 3).astype(np.float64))
+    assert found.voiced.mean() > 0.6
+    assert 180 < 100 * 2 ** np.median(found.pitch[found.voiced]) < 240
+
+
+def test_voice_features_do_not_depend_on_the_level():
+    sound = voice("calm", 1).astype(np.float64)
+    loud, soft = voice_features(sound), voice_features(sound * 0.5)
+    assert loud.shape == (187,)
+    rhythm_and_more = np.abs(loud - soft) / (np.abs(loud) + 0.1)
+    assert np.median(rhythm_and_more) < 1e-3
+
+
+def test_paper_features_are_moments_and_cepstrum():
+    sound = np.random.default_rng(0).normal(size=4000)
+    features = paper_features(sound, 50)
+    assert features.shape == (53,)
+    np.testing.assert_allclose(features[:3], [sound.mean(), sound.var(), np.sqrt((sound**2).mean())])
+
+
+@pytest.mark.parametrize("features", ["voice", "paper"])
+def test_knows_unseen_recordings(clips, features):
+    detector = EmotionDetector(DetectorSettings(features, 50)).fit(clips)
+    for mood in MOODS:
+        heard = [detector.detect(voice(mood, 1000 + k), RATE) for k in range(5)]
+        assert sum(r.emotion == mood for r in heard) >= (5 if features == "voice" else 3)
+        assert all(sum(r.probabilities.values()) == pytest.approx(1) for r in heard)
+
+
+def test_follows_emotion_along_time(detector):
+    sound = np.concatenate([voice("calm", 7, 4.0), voice("excited", 8, 4.0)])
+    track = detector.detect_track(sound, RATE)
+    assert track.labels[0] == "calm"
+    assert track.labels[-1] == "excited"
+    assert track.ends_s[-1] == pytest.approx(8)
+    middle = track.ends_s[np.array(track.labels) == "calm"].max()
+    assert middle == pytest.approx(4, abs=1)
+
+
+def test_track_of_something_short_is_one_interval(detector):
+    track = detector.detect_track(voice("calm", 5, 0.7), RATE)
+    assert track.labels == ("calm",)
+    assert track.ends_s[-1] == pytest.approx(0.7)
+
+
+def test_own_average_of_a_speaker_is_needed_and_used(clips):
+    detector = EmotionDetector(DetectorSettings(normalise=True)).fit(clips)
+    with pytest.raises(FacesynthError, match="recordings of the speaker"):
+        detector.detect(voice("calm", 3), RATE)
+    speaker = detector.features_of([Clip(voice(mood, 500 + k), RATE, mood) for mood in MOODS for k in range(4)])
+    assert detector.detect(voice("excited", 77), RATE, speaker).emotion == "excited"
+
+
+def test_normalising_by_speaker_removes_the_speaker():
+    x = np.random.default_rng(0).normal(size=(20, 3)) + np.repeat([[0], [9]], 10, axis=0)
+    normal = by_speaker(x, np.repeat(["a", "b"], 10))
+    np.testing.assert_allclose(normal.reshape(2, 10, 3).mean(axis=1), 0, atol=1e-9)
+
+
+def test_save_and_load(detector, tmp_path):
+    detector.save(tmp_path / "detector.safetensors")
+    again = EmotionDetector.load(tmp_path / "detector.safetensors")
+    sound = voice("calm", 42)
+    assert again.detect(sound, RATE) == detector.detect(sound, RATE)
+    assert isinstance(again(torch.zeros(2, 187)), torch.Tensor)
+
+
+def test_bad_input_is_one_clear_line(detector, clips, tmp_path):
+    with pytest.raises(FacesynthError, match="constant"):
+        detector.detect(np.full(RATE, 0.2), RATE)
+    with pytest.raises(FacesynthError, match="constant"):
+        detector.detect_track(np.zeros(RATE), RATE)
+    with pytest.raises(FacesynthError, match="10 ms"):
+        detector.detect(voice("calm", 0)[:160], RATE)
+    with pytest.raises(FacesynthError, match="two emotions"):
+        EmotionDetector().fit([c for c in clips if c.emotion == "calm"])
+    with pytest.raises(FacesynthError, match="not trained"):
+        EmotionDetector().detect(voice("calm", 0), RATE)
+    with pytest.raises(FacesynthError, match="feature set"):
+        EmotionDetector(DetectorSettings("fancy"))
+    (tmp_path / "bad.safetensors").write_bytes(b"nothing")
+    with pytest.raises(FacesynthError, match="not an emotion detector"):
+        EmotionDetector.load(tmp_path / "bad.safetensors")
+    with pytest.raises(FacesynthError, match="no such"):
+        EmotionDetector.load(tmp_path / "missing.safetensors")
+
+
+def test_unseen_speakers_of_real_speech(recordings):
+    files = sorted(recordings("ravdess_speech").rglob("*.flac"))
+    clips = []
+    for file in files:
+        emotion, speaker = file.stem.split("-")[2], file.stem.split("-")[6]
+        if speaker in {"01", "02", "03"}:
+            audio, rate = soundfile.read(file, dtype="float32", always_2d=True)
+            clips.append(Clip(resample(audio.mean(axis=1), rate, RATE), RATE, emotion, speaker, file.stem.split("-")[4]))
+    detector = EmotionDetector(DetectorSettings(normalise=True))
+    x = detector.features_of(clips)
+    speakers, emotions = (np.array([getattr(c, name) for c in clips]) for name in ("speaker", "emotion"))
+    train = speakers != "03"
+    detector.fit_features(x[train], [c for c, t in zip(clips, train, strict=True) if t])
+    decided = detector.decide(by_speaker(x[~train], speakers[~train]))
+    recall = np.mean([(decided == e)[emotions[~train] == e].mean() for e in np.unique(emotions)])
+    assert recall > 0.3
