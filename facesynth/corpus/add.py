@@ -111,7 +111,8 @@ def add_recording(corpus: Corpus, record: Record, recording: Recording) -> tuple
         emotions_path=recording.emotions,
         intensity=record.intensity,
     )
-    corpus.add_utterance(record, heard.speech, motion, heard.words, aligned=recording.phones is None)
+    record = replace(record, text=record.text or heard.speech.text)
+    corpus.add_utterance(record, heard.speech, motion, heard.words, aligned=heard.source in ("transcript", "recognition"))
     return True, (*remarks, *heard.warnings)
 
 

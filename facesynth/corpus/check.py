@@ -8,7 +8,7 @@ from facesynth.corpus import check_whole
 from facesynth.corpus.check_motion import motion_problems
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import Files
-from facesynth.corpus.header import Header, read_header
+from facesynth.corpus.header import Header, no_corpus, read_header
 from facesynth.corpus.motion_files import USUAL_FPS
 from facesynth.corpus.problem import Problem, attempt
 from facesynth.corpus.record import Record, parse_records
@@ -27,9 +27,12 @@ LONGEST_DIFFERENCE_S = 0.1
 def check(corpus: Corpus | str | Path) -> list[Problem]:
     """Everything that is wrong with a corpus, grave things first, each with what to do about it.
 
-    A path is enough, for a corpus may be too damaged to open. What is marked unusable may be wrong.
+    A path is enough, for a corpus may be too damaged to open; a folder without corpus.yaml is a FacesynthError. What is
+    marked unusable may be wrong.
     """
     files = Files(corpus.path if isinstance(corpus, Corpus) else Path(corpus))
+    if not files.header.is_file():
+        raise no_corpus(files.root)
     try:
         header = read_header(files.header)
         records, faults = parse_records(files.records)

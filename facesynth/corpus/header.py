@@ -41,12 +41,15 @@ class Header:
             raise FacesynthError(f"fps must lie between 1 and 1000; got {self.fps}")
         if not self.emotions or len(set(self.emotions)) != len(self.emotions) or not all(self.emotions):
             raise FacesynthError(f"a corpus needs a list of different emotions, at least one; got {list(self.emotions)}")
+        for emotion in self.emotions:
+            if emotion != emotion.lower() or any(c.isspace() or c == "," for c in emotion):
+                raise FacesynthError(f"emotion {emotion!r} must be one word in lower case, without commas")
 
 
 def read_header(path: Path) -> Header:
     """Read corpus.yaml; FacesynthError for a folder that is no corpus, or one of another version."""
     if not path.is_file():
-        raise FacesynthError(f"{path.parent} is no corpus (it has no corpus.yaml); make one with `facesynth corpus new`")
+        raise no_corpus(path.parent)
     try:
         plain = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -59,6 +62,11 @@ def read_header(path: Path) -> Header:
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         what = f"{error} is missing" if isinstance(error, KeyError) else error
         raise FacesynthError(f"{path}: {what}") from None
+
+
+def no_corpus(folder: Path) -> FacesynthError:
+    """The error for a folder that is no corpus."""
+    return FacesynthError(f"{folder} is no corpus (it has no corpus.yaml); make one with `facesynth corpus new`")
 
 
 def write_header(path: Path, header: Header) -> None:

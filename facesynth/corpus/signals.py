@@ -21,6 +21,7 @@ from facesynth.motion.gaps import LONGEST_S, GapReport, fill_gaps
 from facesynth.motion.motion import Motion
 from facesynth.motion.pose import fill_head
 from facesynth.speech.audio import load_audio, save_wav
+from facesynth.speech.emotions import read_emotions, write_emotions
 from facesynth.speech.segments import Segment
 from facesynth.speech.speech import EmotionTrack, Speech
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
@@ -62,8 +63,6 @@ def read_emotion_track(files: Files, record: Record, duration_s: float) -> Emoti
     path = files.emotions(record.id)
     if not path.exists():
         return EmotionTrack.constant(record.emotion, duration_s, record.intensity)
-    from facesynth.speech.emotions import read_emotions
-
     return read_emotions(path, duration_s)
 
 
@@ -120,6 +119,4 @@ def _write_emotions(path: Path, record: Record, emotions: EmotionTrack) -> None:
     if emotions.labels == (record.emotion,) and float(emotions.intensities[0]) == record.intensity:
         path.unlink(missing_ok=True)
     else:
-        from facesynth.speech.emotions import write_emotions
-
         write_emotions(path, emotions)

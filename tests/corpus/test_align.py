@@ -20,7 +20,6 @@ class Placed:
 @pytest.fixture
 def aligner(monkeypatch):
     """An aligner that finds one vowel in everything but what says 'nonsense'."""
-    alignment = pytest.importorskip("facesynth.speech.alignment")
 
     def place(audio, rate, text):
         if "nonsense" in text:
@@ -28,7 +27,7 @@ def aligner(monkeypatch):
         duration_s = len(audio) / rate
         return Placed(PhoneTrack(("pau", "aa", "pau"), np.array([0.1, duration_s - 0.1, duration_s])))
 
-    monkeypatch.setattr(alignment, "align", place)
+    monkeypatch.setattr("facesynth.speech.alignment.align", place)
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from corpora import tiny_corpus, tiny_layout, tiny_utterances
 from facesynth.corpus import Corpus
 from facesynth.corpus.check import check
 from facesynth.corpus.record import write_records
+from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
 from facesynth.speech.audio import save_wav
 
@@ -67,10 +68,16 @@ def test_faults_of_the_table(corpus, table, message):
         assert part in text
 
 
-def test_a_folder_that_cannot_be_opened(tmp_path):
-    (problem,) = check(tmp_path)
-    assert "is no corpus" in problem.what
+def test_a_header_that_cannot_be_read(corpus):
+    corpus.files.header.write_text("format: 7", encoding="utf-8")
+    (problem,) = check(corpus)
+    assert "format 7" in problem.what
     assert problem.grave
+
+
+def test_a_folder_that_is_no_corpus(tmp_path):
+    with pytest.raises(FacesynthError, match="is no corpus"):
+        check(tmp_path)
 
 
 @pytest.mark.parametrize(

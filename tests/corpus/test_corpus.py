@@ -108,7 +108,6 @@ def test_names_may_be_of_any_script(tmp_path):
 
 
 def test_emotion_that_moves_is_kept(tmp_path):
-    pytest.importorskip("facesynth.speech.emotions")
     corpus = Corpus.create(tmp_path / "c", **{**ABOUT, "fps": 120})
     record, speech, motion = tiny_utterances(1)[0]
     track = EmotionTrack(("neutral", "sad"), np.array([0.25, speech.duration_s]), np.array([1.0, 0.5]))
@@ -330,6 +329,9 @@ def test_what_is_not_there_is_said(tmp_path, shared):
         Corpus.create(shared.path, **ABOUT)
     with pytest.raises(FacesynthError, match="emotions"):
         Corpus.create(tmp_path / "c", **{**ABOUT, "emotions": ("a", "a")})
+    for emotion in ("Happy", "very sad", "a,b"):
+        with pytest.raises(FacesynthError, match="one word in lower case"):
+            Corpus.create(tmp_path / "c", **{**ABOUT, "emotions": ("neutral", emotion)})
     with pytest.raises(FacesynthError, match="fps"):
         Corpus.create(tmp_path / "c", **{**ABOUT, "fps": float("nan")})
     assert not (tmp_path / "c").exists()

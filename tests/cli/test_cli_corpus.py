@@ -1,0 +1,115 @@
+import json
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from corpora import tiny_corpus, tiny_layout, tiny_utterances
+
+from facesynth.cli.corpus import corpus_group
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.speech.audio import save_wav
+from facesynth.speech.textgrid import write_textgrid
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(corpus_group, list(map(str, arguments)), catch_exceptions=True)
+    if isinstance(result.exception, FacesynthError):
+        raise result.exception
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+@pytest.fixture
+def layout_file(tmp_path):
+    path = tmp_path / "layout.yaml"
+    path.write_text(yaml.safe_dump(tiny_layout().to_dict()), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def session(tmp_path):
+    folder = tmp_path / "session"
+    for record, speech, motion in tiny_utterances(3):
+        save_wav(folder / f"{record.id}.wav", speech.audio, speech.sample_rate)
+        np.savez(folder / f"{record.id}.npz", frames=motion.frames, head=motion.head, fps=120.0)
+        write_textgrid(folder / f"{record.id}.TextGrid", speech.phones)
+    return folder
+
+
+def test_from_nothing_to_statistics(tmp_path, layout_file, session):
+    folder = tmp_path / "Meine Aufnahmen"
+    about = ["--performer", "Åsa", "--layout", layout_file, "--fps", 120]
+    assert "is a corpus of Åsa" in run(
+        "new", folder, *about, "--emotions", "neutral, happy", "--licence", "CC0", "--consent", "yes"
+    )
+    assert Corpus.open(folder).emotions == ("neutral", "happy")
+    report = json.loads(run("add", folder, session, "--emotion", "happy", "--json"))
+    assert (len(report["added"]), report["refused"]) == (3, {})
+    assert "already there 3" in run("add", folder, session)
+    assert json.loads(run("check", folder, "--json")) == {"problems": []}
+    assert json.loads(run("stats", folder, "--json"))["emotions"] == {"neutral": 0, "happy": 3}
+    assert "3 usable of 3" in run("stats", folder)
+    assert "kept 3" in run("align", folder)
+
+
+def test_one_recording_with_everything_said(tmp_path, layout_file, session):
+    run("new", tmp_path / "c", "--performer", "A", "--layout", layout_file, "--fps", 60)
+    name = tiny_utterances(1)[0][0].id
+    words = tmp_path / "words.txt"
+    words.write_text("Hello,\nyou  there", encoding="utf-8")
+    options = ["--text-file", words, "--take", 2, "--sentence", "s1", "--licence", "CC BY", "--consent", "ja", "--id", "a1"]
+    files = [session / f"{name}.wav", session / f"{name}.npz"]
+    out = run("add", tmp_path / "c", *files, "--phones", session / f"{name}.TextGrid", *options, "--intensity", 0.5)
+    assert "resampled from 120 to 60 fps" in out
+    record = Corpus.open(tmp_path / "c").record("a1")
+    assert (record.text, record.take, record.sentence) == ("Hello, you there", 2, "s1")
+    assert (record.licence, record.consent, record.intensity) == ("CC BY", "ja", 0.5)
+
+
+def test_a_list_tells_recordings_apart(tmp_path, layout_file, session):
+    run("new", tmp_path / "c", "--performer", "A", "--layout", layout_file, "--fps", 120)
+    table = tmp_path / "list.csv"
+    table.write_text("id,emotion,take\ns00_happy_t1,happy,1\ns00_neutral_t2,neutral,2\n", encoding="utf-8")
+    run("add", tmp_path / "c", session, "--list", table, "--emotion", "sad")
+    records = {record.id: (record.emotion, record.take) for record in Corpus.open(tmp_path / "c").records}
+    assert records == {"s00_happy_t1": ("happy", 1), "s00_neutral_t2": ("neutral", 2), "s00_neutral_t1": ("sad", 1)}
+
+
+def test_a_layout_may_come_from_another_corpus(tmp_path):
+    corpus = tiny_corpus(tmp_path / "tiny", 1)
+    run("new", tmp_path / "c", "--performer", "A", "--layout", corpus.files.header, "--fps", 30)
+    assert Corpus.open(tmp_path / "c").layout == corpus.layout
+
+
+def test_grave_problems_leave_with_code_2(tmp_path):
+    corpus = tiny_corpus(tmp_path / "tiny", 4)
+    assert run("check", corpus.path) == "nothing is wrong\n"
+    corpus.files.audio(corpus.ids[0]).unlink()
+    assert "1 problems, 0 notes" in run("check", corpus.path, code=2)
+
+
+@pytest.mark.parametrize(
+    "content", ["a: [", "- 1", "kind: markers", "kind: markers\nnames: 3", "kind: marker\nnames: [a]", "x: 1", ""]
+)
+def test_what_is_no_layout_is_one_clear_error(tmp_path, content):
+    (tmp_path / "layout.yaml").write_text(content, encoding="utf-8")
+    with pytest.raises(FacesynthError):
+        run("new", tmp_path / "c", "--performer", "A", "--layout", tmp_path / "layout.yaml", "--fps", 30)
+    assert not (tmp_path / "c").exists()
+
+
+def test_nothing_added_is_an_error(tmp_path, layout_file, session):
+    run("new", tmp_path / "c", "--performer", "A", "--layout", layout_file, "--fps", 120)
+    for path in session.glob("*.npz"):
+        path.write_bytes(b"damaged")
+    with pytest.raises(FacesynthError, match="no recording was added"):
+        run("add", tmp_path / "c", session)
+    with pytest.raises(FacesynthError, match="is no corpus"):
+        run("stats", tmp_path / "nowhere")
+
+
+def test_help_says_what_options_mean():
+    for command in ("new", "add", "align", "check", "stats"):
+        assert "--json" in run(command, "--help")

@@ -1,0 +1,172 @@
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from corpora import EMOTIONS, tiny_layout, tiny_utterances
+
+from facesynth.corpus import Corpus
+from facesynth.corpus.add import add, find_recordings
+from facesynth.corpus.align import align
+from facesynth.errors import FacesynthError
+from facesynth.motion.pose import apply_head, rigid_points
+from facesynth.speech.audio import save_wav
+from facesynth.speech.textgrid import write_label_lines, write_textgrid
+
+NEUTRAL = np.reshape(tiny_layout().neutral, (-1, 3))
+
+
+def new_corpus(path) -> Corpus:
+    return Corpus.create(path, performer="A", layout=tiny_layout(), fps=120, emotions=EMOTIONS, licence="CC0", consent="yes")
+
+
+@pytest.fixture
+def session(tmp_path):
+    """A folder as a day of recording leaves it: head motion still in the markers, phones corrected in Praat."""
+    folder = tmp_path / "Tag 1"
+    for record, speech, motion in tiny_utterances(3):
+        save_wav(folder / f"{record.id}.wav", speech.audio, speech.sample_rate)
+        world = apply_head(motion.points, motion.head, NEUTRAL, rigid_points(motion.layout))
+        np.savez(folder / f"{record.id}.npz", frames=world, fps=120.0)
+        write_textgrid(folder / f"{record.id}.TextGrid", speech.phones)
+        (folder / f"{record.id}.txt").write_text(record.text + "\n", encoding="utf-8")
+    return folder
+
+
+def contents(path) -> dict[str, bytes]:
+    return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
+
+
+def test_a_folder_in_one_go(session, tmp_path):
+    corpus = new_corpus(tmp_path / "c")
+    listed = {record.id: replace(record, text="") for record, *_ in tiny_utterances(3)}
+    report = add(corpus, [session], listed=listed)
+    assert (len(report.added), report.unchanged, report.refused) == (3, (), {})
+    for record, speech, motion in tiny_utterances(3):
+        kept = corpus[record.id]
+        assert (kept.emotion, kept.take, kept.speech.text) == (record.emotion, record.take, record.text)
+        assert kept.speech.phones.labels == speech.phones.labels
+        assert np.abs(kept.motion.frames - motion.frames).max() < 0.3
+        assert np.abs(kept.motion.head - motion.head).max() < 0.3
+        assert corpus.record(record.id).aligned_hash == "", "phones came from a person"
+
+
+def test_again_changes_nothing(session, tmp_path):
+    corpus = new_corpus(tmp_path / "c")
+    add(corpus, [session])
+    before = contents(corpus.path)
+    report = add(Corpus.open(corpus.path), [session])
+    assert (report.added, len(report.unchanged)) == ((), 3)
+    assert contents(corpus.path) == before
+
+
+def test_interrupted_and_repeated_gives_the_same_corpus(session, tmp_path, monkeypatch):
+    whole = new_corpus(tmp_path / "whole")
+    add(whole, [session])
+    corpus = new_corpus(tmp_path / "c")
+    real, calls = Corpus.add_utterance, iter(range(99))
+
+    def interrupted(self, *args, **kwargs):
+        if next(calls) == 1:
+            raise KeyboardInterrupt
+        return real(self, *args, **kwargs)
+
+    monkeypatch.setattr(Corpus, "add_utterance", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        add(corpus, [session])
+    assert len(Corpus.open(corpus.path)) == 1
+    add(Corpus.open(corpus.path), [session])
+    assert contents(corpus.path) == contents(whole.path)
+
+
+def test_what_cannot_be_used_is_named_and_the_rest_added(session, tmp_path):
+    (session / "s00_happy_t1.npz").write_bytes(b"damaged")
+    (session / "s00_neutral_t1.npz").unlink()
+    (session / "notes.docx").write_bytes(b"")
+    (session / ".DS_Store").write_bytes(b"")
+    (session / "lonely.csv").write_text("a\n", encoding="utf-8")
+    shutil.copy(session / "s00_neutral_t2.wav", session / "con.wav")
+    shutil.copy(session / "s00_neutral_t2.npz", session / "con.npz")
+    report = add(new_corpus(tmp_path / "c"), [session])
+    assert report.added == ("s00_neutral_t2",)
+    assert "damaged" in report.refused["s00_happy_t1"]
+    assert "no motion file" in report.refused["s00_neutral_t1"]
+    assert "no sound file" in report.refused["lonely"]
+    assert "neither sound, motion" in report.refused["notes.docx"]
+    assert "device on Windows" in report.refused["con"]
+    assert len(report.refused) == 5
+
+
+def test_two_sounds_of_one_name_are_refused(session):
+    shutil.copy(session / "s00_happy_t1.wav", session / "s00_happy_t1.flac")
+    recordings, refused = find_recordings([session])
+    assert len(recordings) == 2
+    assert "2 files of sound" in refused["s00_happy_t1"]
+
+
+def test_one_sound_and_one_motion_belong_together(session, tmp_path):
+    record, speech, _ = tiny_utterances(1)[0]
+    phones = tmp_path / "labels.txt"
+    write_label_lines(phones, speech.phones)
+    files = [session / f"{record.id}.wav", shutil.move(session / f"{record.id}.npz", tmp_path / "mocap 07.npz")]
+    corpus = new_corpus(tmp_path / "c")
+    report = add(corpus, files, {"id": "Übung", "text": "so so", "emotion": "happy", "take": 3}, phones=phones)
+    assert report.added == ("Übung",)
+    kept = corpus["Übung"]
+    assert (kept.emotion, kept.take, kept.speech.text, kept.sentence) == ("happy", 3, "so so", "so so")
+    assert kept.speech.phones.labels == speech.phones.labels
+
+
+def test_emotion_that_moves_comes_with_the_recording(session, tmp_path):
+    for path in session.glob("s00_neutral*"):
+        path.unlink()
+    (session / "s00_happy_t1.emotions.csv").write_text("end_s,emotion,intensity\n0.5,neutral,1\n9,sad,0.5\n", encoding="utf-8")
+    corpus = new_corpus(tmp_path / "c")
+    report = add(corpus, [session], {"emotion": "sad"})
+    assert report.refused == {}
+    assert corpus["s00_happy_t1"].speech.emotions.labels == ("neutral", "sad")
+
+
+def test_words_of_a_textgrid_are_the_text(session, tmp_path):
+    record, speech, _ = tiny_utterances(1)[0]
+    write_textgrid(session / f"{record.id}.TextGrid", speech.phones, [("good", 0.2, 0.5), ("day", 0.5, 0.7)])
+    (session / f"{record.id}.txt").unlink()
+    corpus = new_corpus(tmp_path / "c")
+    add(corpus, [session])
+    assert corpus.record(record.id).text == "good day"
+
+
+def test_real_speech_with_its_words_is_aligned_and_may_be_aligned_anew(recordings, tmp_path):
+    sound = min(recordings("ravdess_speech").rglob("03-01-01-01-01-01-01.flac"))
+    wave = 0.1 * np.sin(np.arange(600) / 7)[:, None, None]
+    np.savez(tmp_path / "mocap.npz", frames=NEUTRAL + wave * np.arange(len(NEUTRAL))[:, None], head=np.zeros((600, 6)))
+    corpus = new_corpus(tmp_path / "c")
+    report = add(corpus, [sound, tmp_path / "mocap.npz"], {"text": "Kids are talking by the door."})
+    assert report.refused == {}
+    (utterance,) = corpus
+    assert {"k", "ih", "d", "z", "t", "ao"} <= set(utterance.speech.phones.labels)
+    assert len(utterance.motion) == round(utterance.speech.duration_s * 120)
+    assert align(corpus).aligned == corpus.ids
+    assert corpus[utterance.id].speech.phones.labels == utterance.speech.phones.labels
+
+
+def test_an_emotion_that_the_corpus_lacks_is_refused_before_anything_is_heard(session, tmp_path):
+    report = add(new_corpus(tmp_path / "c"), [session], {"emotion": "bored"})
+    assert report.added == ()
+    assert "emotion 'bored' is none of the corpus'" in report.refused["s00_happy_t1"]
+
+
+def test_another_recording_of_the_same_name_is_refused(session, tmp_path):
+    corpus = new_corpus(tmp_path / "c")
+    add(corpus, [session])
+    shutil.copy(session / "s00_neutral_t2.wav", session / "s00_happy_t1.wav")
+    report = add(corpus, [session])
+    assert len(report.unchanged) == 2
+    assert "another recording" in report.refused["s00_happy_t1"]
+
+
+def test_what_fits_one_recording_is_refused_for_many(session, tmp_path):
+    with pytest.raises(FacesynthError, match="fit one recording, but there are 3"):
+        add(new_corpus(tmp_path / "c"), [session], {"text": "hello"})
+    with pytest.raises(FacesynthError, match="no such file"):
+        add(new_corpus(tmp_path / "d"), [tmp_path / "nowhere"])
