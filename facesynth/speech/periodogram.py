@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from facesynth.errors import FacesynthError, unknown
+from facesynth.speech.audio import resample
 from facesynth.speech.speech import Speech
 
 Scale = Literal["linear", "log"]
@@ -65,14 +66,5 @@ class Periodogram(nn.Module):
 
     def of(self, speech: Speech, count: int) -> Tensor:
         """Coefficients [count, 256] of an utterance at any sampling rate."""
-        return self(resampled(torch.from_numpy(speech.audio), speech.sample_rate), count)
-
-
-def resampled(audio: Tensor, sample_rate: int) -> Tensor:
-    """Sound [S] at 16 kHz, through a polyphase low-pass filter."""
-    from scipy.signal import resample_poly
-
-    if sample_rate == RATE:
-        return audio
-    shared = math.gcd(RATE, sample_rate)
-    return torch.from_numpy(resample_poly(audio.numpy(), RATE // shared, sample_rate // shared))
+        audio = torch.from_numpy(resample(speech.audio, speech.sample_rate, RATE))
+        return self(audio.to(self.window.device), count)

@@ -11,6 +11,7 @@ from facesynth.methods.lds.deterministic import fit_inputs, observability, shift
 from facesynth.methods.lds.stochastic import predictor_space, realise
 from facesynth.methods.lds.system import Array, Clip, LinearSystem
 
+FEWEST_ROWS = 2
 REFITS = 2
 """How often the deterministic part is fitted again with the noise model known."""
 
@@ -23,7 +24,7 @@ def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> Linea
     the deterministic part leaves of the output and not from the projection that is orthogonal
     to the inputs, because that projection still holds deterministic state that a finite window cannot see.
     """
-    require_enough(clips, rows, orders)
+    require_rows_for(orders, rows, clips[0].u.shape[1], clips[0].y.shape[1])
     gamma, singular = observability(clips, rows)
     A, C = shift_invariance(gamma, clips[0].y.shape[1], orders[0])
     A, repaired = stabilised(A)
@@ -37,24 +38,35 @@ def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> Linea
     return LinearSystem(deterministic, stochastic, starts, singular, correlations, repaired + moved)
 
 
-def hankel_columns(clips: Sequence[Clip], rows: int) -> int:
-    """How many positions the pair of windows (past, future) has in all clips together."""
-    return sum(max(len(clip.u) - 2 * rows + 1, 0) for clip in clips)
+def hankel_columns(lengths: Sequence[int], rows: int) -> int:
+    """How many positions the pair of windows (past, future) has in clips of these lengths together."""
+    return sum(max(length - 2 * rows + 1, 0) for length in lengths)
 
 
-def require_enough(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> None:
-    """FacesynthError unless there are 3 columns per row of the Hankel matrix, and rows for the orders."""
+def fitting_rows(clips: Sequence[Clip], wanted: int) -> int:
+    """The largest number of block rows up to `wanted` that the recording has frames for.
+
+    That is three columns of the Hankel matrix for each of its rows; FacesynthError where not even two block rows have them.
+    """
+    lengths = [len(clip.u) for clip in clips]
     m, p = clips[0].u.shape[1], clips[0].y.shape[1]
-    needed, columns = 3 * 2 * rows * (m + p), hankel_columns(clips, rows)
-    if columns < needed:
+    for rows in range(wanted, FEWEST_ROWS - 1, -1):
+        if hankel_columns(lengths, rows) >= 3 * 2 * rows * (m + p):
+            return rows
+    needed = 3 * 2 * FEWEST_ROWS * (m + p) + len(lengths) * (2 * FEWEST_ROWS - 1)
+    raise FacesynthError(
+        f"{sum(lengths)} frames in {len(lengths)} clips are too few for {m} features of the sound and {p} components of the "
+        f"shape: at least {needed} frames are needed; record more, or keep fewer features and components"
+    )
+
+
+def require_rows_for(orders: tuple[int, int], rows: int, m: int, p: int) -> None:
+    """FacesynthError where Hankel matrices of `rows` block rows cannot show so many states."""
+    most = min((rows - 1) * p, rows * m), rows * p
+    if not (1 <= orders[0] <= most[0] and 1 <= orders[1] <= most[1]):
         raise FacesynthError(
-            f"{sum(len(clip.u) for clip in clips)} frames in {len(clips)} clips are too few for {rows} block rows, {m} features "
-            f"and {p} shape components: at least {needed + len(clips) * (2 * rows - 1)} frames are needed; "
-            "record more, or lower the number of rows or components"
-        )
-    if (rows - 1) * p < orders[0] or rows * min(m, p) < max(orders[0], 1) or rows * p < orders[1]:
-        raise FacesynthError(
-            f"{rows} block rows of {p} shape components and {m} features cannot show {orders} states; raise rows"
+            f"{orders[0]} deterministic and {orders[1]} stochastic states do not fit: with {rows} block rows, {m} features and "
+            f"{p} components there can be 1 to {most[0]} and 1 to {most[1]}; lower the orders or raise rows"
         )
 
 

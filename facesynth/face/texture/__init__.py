@@ -1,0 +1,1 @@
+"""A real speaker's picture, moved: points tracked in video, warped frames, and their composition."""

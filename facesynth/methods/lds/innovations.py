@@ -1,0 +1,82 @@
+"""The noise that drives the stochastic part: independent sources, each with its histogram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from facesynth.errors import FacesynthError
+from facesynth.methods.lds.system import Array, Stochastic
+from facesynth.motion.ica import Ica
+
+
+class Innovations(nn.Module):
+    """`e = D v` with independent v_i, each drawn from its histogram (Saisan 2004, eq. 4 and 10)."""
+
+    mixing: Tensor
+    """[p, p] D, the sources of unit variance."""
+    edges: Tensor
+    """[p, bins + 1] edges of each source's histogram."""
+    cumulative: Tensor
+    """[p, bins + 1] share of samples below each edge, 0 to 1."""
+    kurtosis: Tensor
+    """[p] excess kurtosis of each source: 0 for a Gaussian, 3 for a Laplacian."""
+
+    def __init__(self, mixing: Tensor, edges: Tensor, cumulative: Tensor, kurtosis: Tensor, *, independent: bool = True) -> None:
+        super().__init__()
+        self.register_buffer("mixing", mixing)
+        self.register_buffer("edges", edges)
+        self.register_buffer("cumulative", cumulative)
+        self.register_buffer("kurtosis", kurtosis)
+        self.independent = independent
+
+    @classmethod
+    def empty(cls) -> Self:
+        """One without content, for `load` to fill."""
+        return cls(*(torch.zeros(0) for _ in range(4)))
+
+    @classmethod
+    def fit(cls, e: Array, *, seed: int = 0) -> Self:
+        """Learn D and the histograms from innovations [N, p].
+
+        Where independent components do not settle, because the innovations are as good as Gaussian, uncorrelated ones
+        stand in (D is then the symmetric root of the covariance) and `independent` is False.
+        """
+        try:
+            mixing, independent = Ica.fit(e, seed=seed).mixing.double().numpy(), True
+        except FacesynthError:
+            mixing, independent = _symmetric_root(e), False
+        v = np.linalg.solve(mixing, e.T).T
+        bins = int(np.clip(np.sqrt(len(v)), 8, 128))
+        edges = np.stack([np.histogram_bin_edges(column, bins) for column in v.T])
+        counts = np.stack([np.histogram(column, edge)[0] for column, edge in zip(v.T, edges, strict=True)])
+        cumulative = np.concatenate([np.zeros((len(counts), 1)), counts.cumsum(axis=1) / len(v)], axis=1)
+        kurtosis = ((v - v.mean(axis=0)) ** 4).mean(axis=0) / v.var(axis=0) ** 2 - 3
+        arrays = (mixing, edges, cumulative, kurtosis)
+        return cls(*(torch.from_numpy(array.astype(np.float32)) for array in arrays), independent=independent)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Tensor:
+        """Innovations e [count, p]: each source by the inverse of its cumulative histogram."""
+        uniform = rng.random((count, len(self.mixing)))
+        edges, cumulative = self.edges.cpu().double().numpy(), self.cumulative.cpu().double().numpy()
+        v = np.stack([np.interp(uniform[:, i], cumulative[i], edges[i]) for i in range(len(edges))], axis=1)
+        return torch.from_numpy(v.astype(np.float32)).to(self.mixing.device) @ self.mixing.T
+
+
+def innovations_of(signals: Sequence[Array], noise: Stochastic, burn_in: int) -> Array:
+    """One-step prediction errors [N, p] of all clips, without the first `burn_in` frames of each."""
+    return np.concatenate([noise.innovations(y[:, :, None])[0][burn_in:, :, 0] for y in signals])
+
+
+def no_change_error(signals: Sequence[Array], weights: Array) -> float:
+    """Mean squared error [unit squared] of predicting each frame by the one before it; `weights` [p] are squared scales."""
+    return float(np.concatenate([np.diff(y, axis=0) ** 2 @ weights for y in signals]).mean())
+
+
+def _symmetric_root(e: Array) -> Array:
+    values, vectors = np.linalg.eigh(np.cov(e, rowvar=False).reshape(e.shape[1], -1))
+    return (vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T

@@ -1,0 +1,170 @@
+"""The linear dynamical system as a method of the zoo."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.methods.lds.features import Standardised
+from facesynth.methods.lds.identification import fitting_rows, identify
+from facesynth.methods.lds.innovations import Innovations, innovations_of, no_change_error
+from facesynth.methods.lds.recordings import Piece, periodograms, pieces_of
+from facesynth.methods.lds.rollout import Rollout
+from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, plain
+from facesynth.methods.lds.system import Array, Clip, LinearSystem
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.motion.motion import Motion
+from facesynth.speech.periodogram import Periodogram, Scale
+from facesynth.speech.speech import Speech
+
+SETTLING_S = 4.0
+"""How long the noise runs before the first frame, so that it starts as it goes on."""
+
+
+@register("lds")
+class LDS(Method):
+    """Speech-driven linear dynamical system with non-Gaussian noise (Saisan 2004).
+
+    Parameters
+    ----------
+    scale : "log" or "linear"
+        Of the periodogram; the paper's is linear.
+    features : float
+        Principal components of the periodogram: a count, or below 1 a share of variance. The paper has 4.
+    lead_ms : float or "auto"
+        How far the sound is looked ahead, ms; chosen by the error on clips left out.
+    components : float
+        Principal components of the shape: a count, or below 1 a share of variance.
+    rows : int
+        Block rows k: frames of past and of future that are compared. Lowered where the recording is short.
+    deterministic_order, stochastic_order : int or "auto"
+        States of the two parts; chosen by the error on clips left out.
+    """
+
+    features: Standardised
+    shape: Standardised
+    rollout: Rollout
+    innovations: Innovations
+
+    def __init__(
+        self,
+        *,
+        scale: Scale = "log",
+        features: float = 8,
+        lead_ms: float | Auto = "auto",
+        components: float = 8,
+        rows: int = 8,
+        deterministic_order: int | Auto = "auto",
+        stochastic_order: int | Auto = "auto",
+    ) -> None:
+        super().__init__(
+            scale=scale,
+            features=features,
+            lead_ms=lead_ms,
+            components=components,
+            rows=rows,
+            deterministic_order=deterministic_order,
+            stochastic_order=stochastic_order,
+        )
+        _check(self.config)
+        self.features, self.shape = Standardised.empty(), Standardised.empty()
+        self.rollout, self.innovations = Rollout.empty(), Innovations.empty()
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Learn from a corpus of any layout; `facts` holds what was chosen, the errors and the poles."""
+        self.learned_from(corpus)
+        pieces, left_out = pieces_of(corpus)
+        self.shape = Standardised.fit([piece.frames for piece in pieces], self.config["components"], "the motion")
+        weights = self.shape.scale.double().square().numpy()
+        sentences = [piece.sentence for piece in pieces]
+
+        lead = choose_lead(
+            self.config["lead_ms"], lambda lead_ms: self._clips(pieces, lead_ms), sentences, self.config["rows"], weights
+        )
+        clips = self._clips(pieces, lead.chosen)
+        rows = fitting_rows(clips, self.config["rows"])
+        wanted = self.config["deterministic_order"], self.config["stochastic_order"]
+        orders = choose_orders(wanted, clips, sentences, rows, weights)
+        system = identify(clips, rows, (int(orders[0].chosen), int(orders[1].chosen)))
+
+        self._keep(system, clips, rows, seed)
+        self.facts |= {
+            "frames_left_out_for_gaps": left_out,
+            "rows": rows,
+            "lead_ms": plain(lead),
+            "deterministic_order": plain(orders[0]),
+            "stochastic_order": plain(orders[1]),
+            "no_change_error": no_change_error([clip.y for clip in clips], weights),
+        }
+        return self
+
+    @torch.no_grad()
+    def synthesize(self, speech: Speech, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
+        """Motion for new speech, of which only the sound counts: this model knows neither phones nor emotions.
+
+        `noise` scales the innovations: 1 as recorded, 0 for the deterministic part alone.
+        """
+        layout = self.fitted_layout
+        if options:
+            raise FacesynthError(f"lds knows the options seed and noise; got {', '.join(sorted(options))}")
+        if not (np.isfinite(noise) and noise >= 0):
+            raise FacesynthError(f"noise must be 0 (none), 1 (as recorded) or another number that is not negative; got {noise}")
+        count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
+        e, settled = self.draw(count, noise, seed)
+        shape, _ = self.rollout(self.encode(speech, count), e, settled)
+        frames = self.shape.decode(shape)
+        return Motion((frames.clamp(0, 1) if layout.kind == "curves" else frames).cpu().numpy(), self.fps, layout)
+
+    def encode(self, speech: Speech, count: int) -> Tensor:
+        """The system's input [count, m] for an utterance."""
+        periodogram = Periodogram(self.fps, self.config["scale"], self.facts["lead_ms"]["chosen"])
+        return self.features.encode(periodogram.of(speech, count).to(self.features.scale.device))
+
+    def draw(self, count: int, noise: float, seed: int) -> tuple[Tensor, Tensor]:
+        """Innovations [count, p], and the state [n] that the noise has reached before the first frame."""
+        settling = round(SETTLING_S * self.fps)
+        e = noise * self.innovations.draw(settling + count, np.random.default_rng(seed))
+        no_sound = e.new_zeros(settling, self.rollout.B.shape[1] - e.shape[1])
+        _, state = self.rollout(no_sound, e[:settling], self.rollout.rest())
+        return e[settling:], state
+
+    def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
+        sounds = periodograms(pieces, Periodogram(self.fps, self.config["scale"], lead_ms))
+        self.features = Standardised.fit(sounds, self.config["features"], "the sound")
+        return [
+            Clip(_encoded(self.features, sound), _encoded(self.shape, piece.frames))
+            for sound, piece in zip(sounds, pieces, strict=True)
+        ]
+
+    def _keep(self, system: LinearSystem, clips: list[Clip], rows: int, seed: int) -> None:
+        rest = system.stochastic_output(tuple(clips))
+        self.innovations = Innovations.fit(innovations_of(rest, system.stochastic, rows), seed=seed)
+        self.rollout = Rollout.of(system.deterministic, system.stochastic)
+        self.facts = {
+            "poles": system.poles(),
+            "repaired": list(system.repaired),
+            "singular_values": system.singular_values.tolist(),
+            "canonical_correlations": system.correlations.tolist(),
+            "innovations_independent": self.innovations.independent,
+            "kurtosis": self.innovations.kurtosis.tolist(),
+        }
+
+
+def _encoded(part: Standardised, frames: np.ndarray) -> Array:
+    return part.encode(torch.from_numpy(frames)).double().numpy()
+
+
+def _check(config: dict[str, Any]) -> None:
+    Periodogram(25.0, config["scale"])
+    for name in ("rows", "deterministic_order", "stochastic_order"):
+        value, automatic = config[name], name != "rows"
+        if not (automatic and value == "auto") and not (isinstance(value, int) and value >= 1):
+            raise FacesynthError(f"{name} must be a whole number from 1{' or auto' if automatic else ''}; got {value!r}")
+    if config["lead_ms"] != "auto" and not isinstance(config["lead_ms"], int | float):
+        raise FacesynthError(f"lead_ms must be a number of milliseconds or auto; got {config['lead_ms']!r}")

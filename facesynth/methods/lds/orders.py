@@ -1,0 +1,115 @@
+"""How many states, and which lead of the sound: by the error on clips that were left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
+from facesynth.methods.lds.stochastic import predictor_space, realise
+from facesynth.methods.lds.system import Array, Clip, Deterministic
+
+FOLDS = 4
+MOST_FRAMES = 20_000
+"""Of longer recordings, evenly spaced clips with about this many frames decide."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Candidates, their held-out errors, and the one chosen."""
+
+    candidates: tuple[float, ...]
+    errors: tuple[float, ...]
+    """Mean squared held-out error of each candidate, in the shape's unit squared, summed over components."""
+    chosen: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Clips to learn from and clips to judge by."""
+
+    train: tuple[Clip, ...]
+    test: tuple[Clip, ...]
+
+
+def folds(clips: Sequence[Clip], sentences: Sequence[str], rows: int) -> list[Fold]:
+    """Up to four folds by sentence; a recording with fewer sentences than two is cut in time."""
+    clips, sentences = _thinned(clips, sentences)
+    if len(set(sentences)) < 2:
+        clips = [piece for clip in clips for piece in _cut(clip, max(len(clip.u) // (2 * FOLDS), 4 * rows))]
+        sentences = [str(i) for i in range(len(clips))]
+    number = {sentence: i % FOLDS for i, sentence in enumerate(sorted(set(sentences)))}
+    which = np.array([number[sentence] for sentence in sentences])
+    return [
+        Fold(
+            tuple(clip for clip, w in zip(clips, which, strict=True) if w != fold),
+            tuple(clip for clip, w in zip(clips, which, strict=True) if w == fold),
+        )
+        for fold in range(which.max() + 1)
+    ]
+
+
+def deterministic_errors(parts: Sequence[Fold], rows: int, orders: Sequence[int], weights: Array) -> Array:
+    """[orders, held-out clips] mean squared error of the simulated output, from state zero.
+
+    `weights` [p] are the squared scales of the shape's components.
+    """
+
+    def judge(fold: Fold) -> Array:
+        gamma, _ = observability(fold.train, rows)
+        models = [_deterministic(fold.train, gamma, order) for order in orders]
+        return np.array([[_mean_square(c.y - model.simulate(c.u), weights) for c in fold.test] for model in models])
+
+    return np.concatenate([judge(fold) for fold in parts], axis=1)
+
+
+def stochastic_errors(parts: Sequence[Fold], rows: int, order: int, orders: Sequence[int], weights: Array) -> Array:
+    """[orders, held-out clips] mean squared error one step ahead, beside a deterministic part of `order` states.
+
+    The first `rows` frames of a clip do not count, while the predictor does not know the clip yet.
+    """
+
+    def judge(fold: Fold) -> Array:
+        gamma, _ = observability(fold.train, rows)
+        model = _deterministic(fold.train, gamma, order)
+        rest = [clip.y - model.simulate(clip.u) for clip in fold.train]
+        functionals, _ = predictor_space(rest, rows)
+        noises = [realise(rest, rows, functionals, candidate)[0] for candidate in orders]
+        left = [(clip.y - model.simulate(clip.u))[:, :, None] for clip in fold.test]
+        return np.array([[_mean_square(noise.innovations(y)[0][rows:, :, 0], weights) for y in left] for noise in noises])
+
+    return np.concatenate([judge(fold) for fold in parts], axis=1)
+
+
+def plainest_good(candidates: Sequence[float], errors: Array) -> Choice:
+    """The first candidate, plainest first, within one standard error of the best.
+
+    The standard error is that of the difference to the best over held-out clips [candidates, clips]: how hard a clip
+    is for all candidates says nothing about which is better.
+    """
+    means = errors.mean(axis=1)
+    excess = errors - errors[means.argmin()]
+    spread = excess.std(axis=1, ddof=1) / np.sqrt(errors.shape[1]) if errors.shape[1] > 1 else np.zeros(len(means))
+    first = int(np.argmax(excess.mean(axis=1) <= spread))
+    return Choice(tuple(candidates), tuple(means.tolist()), candidates[first])
+
+
+def _deterministic(clips: Sequence[Clip], gamma: Array, order: int) -> Deterministic:
+    A, C = shift_invariance(gamma, clips[0].y.shape[1], order)
+    return fit_inputs(stabilised(A)[0], C, clips, None)[0]
+
+
+def _mean_square(error: Array, weights: Array) -> float:
+    return float((error**2 @ weights).mean())
+
+
+def _thinned(clips: Sequence[Clip], sentences: Sequence[str]) -> tuple[Sequence[Clip], Sequence[str]]:
+    step = max(1, round(sum(len(clip.u) for clip in clips) / MOST_FRAMES))
+    return (clips, sentences) if len(clips) < 2 * step * FOLDS else (clips[::step], sentences[::step])
+
+
+def _cut(clip: Clip, length: int) -> list[Clip]:
+    count = max(len(clip.u) // length, 1)
+    return [Clip(u, y) for u, y in zip(np.array_split(clip.u, count), np.array_split(clip.y, count), strict=True)]

@@ -1,0 +1,65 @@
+"""Running the system: any length at once, or frame by frame with the state handed on."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+import torch
+from scipy.linalg import block_diag
+from torch import Tensor, nn
+
+from facesynth.methods.lds.system import Deterministic, Stochastic
+
+
+class Rollout(nn.Module):
+    """Both parts as one system: x' = A x + B [u; e], y = C x + D [u; e], x = [x_d; x_s]."""
+
+    A: Tensor
+    """[n, n] block diagonal."""
+    B: Tensor
+    """[n, m + p]"""
+    C: Tensor
+    """[p, n]"""
+    D: Tensor
+    """[p, m + p] = [D_d, I]"""
+
+    def __init__(self, A: Tensor, B: Tensor, C: Tensor, D: Tensor) -> None:
+        super().__init__()
+        for name, matrix in (("A", A), ("B", B), ("C", C), ("D", D)):
+            self.register_buffer(name, matrix)
+
+    @classmethod
+    def empty(cls) -> Self:
+        """One without content, for `load` to fill."""
+        return cls(*(torch.zeros(0, 0) for _ in range(4)))
+
+    @classmethod
+    def of(cls, deterministic: Deterministic, stochastic: Stochastic) -> Self:
+        """From what was identified."""
+        A, B = block_diag(deterministic.A, stochastic.A), block_diag(deterministic.B, stochastic.B)
+        C = np.hstack([deterministic.C, stochastic.C])
+        D = np.hstack([deterministic.D, np.eye(len(C))])
+        return cls(*(torch.from_numpy(matrix.astype(np.float32)) for matrix in (A, B, C, D)))
+
+    def rest(self) -> Tensor:
+        """[n] the state of a face whose inputs have been average for long: zero."""
+        return self.A.new_zeros(len(self.A))
+
+    def step(self, u: Tensor, e: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """One frame: features [m], innovation [p], state [n] to shape [p] and the next state [n]."""
+        drive = torch.cat([u, e])
+        return self.C @ state + self.D @ drive, self.A @ state + self.B @ drive
+
+    def forward(self, u: Tensor, e: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Features [T, m], innovations [T, p], first state [n] to shapes [T, p] and the state after them [n].
+
+        Feeding it the frames in pieces, the state handed on, gives what feeding them at once gives.
+        """
+        drive = torch.cat([u, e], dim=1)
+        pushes = drive @ self.B.T
+        states = []
+        for push in pushes:
+            states.append(state)
+            state = torch.addmv(push, self.A, state)
+        return torch.stack(states) @ self.C.T + drive @ self.D.T, state

@@ -1,0 +1,229 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+from corpora import tiny_corpus, tiny_layout
+
+from facesynth.corpus import Corpus, Record
+from facesynth.errors import FacesynthError
+from facesynth.methods.lds.innovations import Innovations
+from facesynth.methods.lds.method import LDS
+from facesynth.methods.lds.orders import folds, plainest_good
+from facesynth.methods.lds.rollout import Rollout
+from facesynth.methods.lds.system import Clip
+from facesynth.methods.registry import load
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+
+QUICK = {"features": 4, "components": 4, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("lds") / "tiny", utterances=8, fps=60)
+
+
+@pytest.fixture(scope="module")
+def model(corpus):
+    return LDS(**QUICK).fit(corpus)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """Curves that follow the loudness of their sound through a first-order system, with noise: 12 clips of 4 s."""
+    rng = np.random.default_rng(0)
+    layout = Layout("curves", ("jaw", "smile", "brow"))
+    path = tmp_path_factory.mktemp("driven") / "corpus"
+    corpus = Corpus.create(path, performer="Driven", layout=layout, fps=30, emotions=("neutral",), synthetic=True)
+    for i in range(12):
+        loudness = np.repeat(rng.uniform(0.0, 1.0, 40), 3)
+        audio = rng.normal(size=120 * 533) * 0.1 * np.repeat(loudness, 533)
+        jaw = np.convolve(loudness, 0.6 * 0.4 ** np.arange(10))[:120]
+        frames = 0.1 + np.outer(jaw, [0.6, 0.2, 0]) + 0.01 * rng.laplace(size=(120, 3))
+        corpus.add_utterance(Record(f"c{i:02d}", sentence=f"c{i:02d}"), said(audio, 533 * 30), Motion(frames, 30, layout))
+    return corpus
+
+
+def said(audio, rate):
+    seconds = len(audio) / rate
+    track = EmotionTrack.constant("neutral", seconds)
+    return Speech(audio.astype(np.float32), rate, PhoneTrack(("pau",), np.array([seconds])), track)
+
+
+def test_the_default_choices_beat_the_mean_pose(driven):
+    train, test = driven.subset(driven.ids[:9]), driven.subset(driven.ids[9:])
+    model = LDS(features=2, components=2).fit(train)
+    mean = np.concatenate([utterance.motion.frames for utterance in train]).mean(axis=0)
+    for utterance in test:
+        truth = utterance.motion.frames
+        drawn = model.synthesize(utterance.speech, noise=0).frames
+        assert ((drawn - truth) ** 2).mean() < 0.4 * ((mean - truth) ** 2).mean()
+
+
+def test_one_step_prediction_beats_no_change(driven):
+    facts = LDS(features=2, components=2, lead_ms=0).fit(driven).facts
+    assert min(facts["stochastic_order"]["errors"]) < facts["no_change_error"]
+
+
+def test_length_rate_and_layout_are_those_learned(corpus, model):
+    for utterance in list(corpus)[:3]:
+        motion = model.synthesize(utterance.speech)
+        assert len(motion) == utterance.speech.phones.frame_bounds(60)[-1]
+        assert (motion.fps, motion.layout) == (60, tiny_layout())
+        assert np.isfinite(motion.frames).all()
+
+
+def test_same_seed_same_motion_and_no_noise_no_seed(corpus, model):
+    speech = corpus[corpus.ids[0]].speech
+    one, same, other = (model.synthesize(speech, seed=seed).frames for seed in (1, 1, 2))
+    assert np.array_equal(one, same)
+    assert not np.allclose(one, other)
+    assert np.array_equal(model.synthesize(speech, seed=1, noise=0).frames, model.synthesize(speech, seed=2, noise=0).frames)
+
+
+def test_noise_moves_samples_away_from_the_deterministic_part_in_proportion(corpus, model):
+    speech = corpus[corpus.ids[0]].speech
+    plain, half, full = (model.synthesize(speech, seed=1, noise=noise).frames for noise in (0, 0.5, 1))
+    np.testing.assert_allclose(half - plain, (full - plain) / 2, atol=1e-3)
+
+
+def test_a_saved_model_speaks_the_same(corpus, model, tmp_path):
+    model.save(tmp_path / "model.safetensors")
+    speech = corpus[corpus.ids[1]].speech
+    back = load(tmp_path / "model.safetensors")
+    assert isinstance(back, LDS)
+    assert np.array_equal(back.synthesize(speech, seed=3).frames, model.synthesize(speech, seed=3).frames)
+
+
+def test_fits_repeat(corpus, model):
+    again = LDS(**QUICK).fit(corpus)
+    assert json.dumps(again.facts) == json.dumps(model.facts)
+    assert all(torch.equal(a, b) for a, b in zip(again.state_dict().values(), model.state_dict().values(), strict=True))
+
+
+def test_frame_by_frame_is_the_whole(model):
+    rng = torch.Generator().manual_seed(0)
+    u, e = torch.randn(50, 4, generator=rng), torch.randn(50, 4, generator=rng)
+    whole, last = model.rollout(u, e, model.rollout.rest())
+    state, frames = model.rollout.rest(), []
+    for one_u, one_e in zip(u, e, strict=True):
+        frame, state = model.rollout.step(one_u, one_e, state)
+        frames.append(frame)
+    torch.testing.assert_close(torch.stack(frames), whole, atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(state, last, atol=1e-5, rtol=1e-5)
+    first, state = model.rollout(u[:20], e[:20], model.rollout.rest())
+    second, _ = model.rollout(u[20:], e[20:], state)
+    torch.testing.assert_close(torch.cat([first, second]), whole, atol=1e-5, rtol=1e-5)
+
+
+def test_rollout_is_the_double_precision_simulation():
+    from simulated_lds import random_truth
+
+    truth = random_truth(0)
+    rng = np.random.default_rng(0)
+    u, e = rng.normal(size=(300, 2)), rng.normal(size=(300, 3))
+    rollout = Rollout.of(truth.deterministic, truth.stochastic)
+    got, _ = rollout(torch.from_numpy(u).float(), torch.from_numpy(e).float(), rollout.rest())
+    np.testing.assert_allclose(got, truth.deterministic.simulate(u) + truth.stochastic.simulate(e), atol=1e-4)
+
+
+def test_drawn_innovations_have_the_moments_of_the_recorded():
+    rng = np.random.default_rng(0)
+    mixing = rng.normal(size=(3, 3))
+    e = rng.laplace(scale=np.sqrt(0.5), size=(20_000, 3)) @ mixing.T
+    learned = Innovations.fit(e)
+    drawn = learned.draw(20_000, np.random.default_rng(1)).double().numpy()
+    assert learned.independent
+    np.testing.assert_allclose(np.cov(drawn.T), np.cov(e.T), atol=0.1 * np.cov(e.T).max())
+    np.testing.assert_allclose(drawn.mean(axis=0), e.mean(axis=0), atol=0.05)
+    assert (learned.kurtosis > 2).all()
+
+
+def test_silence_holds_still_and_stays_among_what_was_seen(corpus, model):
+    quiet = said(np.zeros(16_000), 16_000)
+    frames = model.synthesize(quiet, noise=0).frames
+    seen = corpus.arrays().frames
+    margin = 0.5 * np.ptp(seen, axis=0).max()
+    assert np.isfinite(frames).all()
+    assert (frames > seen.min(axis=0) - margin).all()
+    assert (frames < seen.max(axis=0) + margin).all()
+    assert np.abs(np.diff(frames[-10:], axis=0)).max() < 0.1
+
+
+def test_folds_keep_sentences_together():
+    clips = [Clip(np.full((40, 1), float(i)), np.zeros((40, 1))) for i in range(9)]
+    sentences = ["a", "a", "b", "b", "c", "c", "d", "e", "f"]
+    parts = folds(clips, sentences, 5)
+    assert len(parts) == 4
+    for fold in parts:
+        names = [{sentences[int(clip.u[0, 0])] for clip in side} for side in (fold.train, fold.test)]
+        assert not names[0] & names[1]
+    assert sum(len(fold.test) for fold in parts) == 9
+
+
+def test_one_long_clip_is_cut_in_time():
+    parts = folds([Clip(np.arange(800.0)[:, None], np.zeros((800, 1)))], ["only"], 5)
+    assert sum(len(clip.u) for fold in parts for clip in fold.test) == 800
+
+
+def test_the_plainest_candidate_that_is_as_good_wins():
+    rng = np.random.default_rng(0)
+    hard = rng.uniform(1, 10, 20)
+    errors = np.array([hard + 1, hard + 0.02 * rng.normal(size=20), hard + 0.02 * rng.normal(size=20)])
+    choice = plainest_good((1, 2, 3), errors)
+    assert choice.chosen == 2
+    assert len(choice.errors) == 3
+
+
+def test_gaps_split_recordings_and_are_counted(corpus, tmp_path):
+    holed = tiny_corpus(tmp_path / "holed", utterances=8, fps=60)
+    raw = holed.raw_motion(holed.ids[0])
+    frames = raw.frames.copy()
+    frames[40:60] = np.nan
+    copy = Corpus.create(tmp_path / "copy", performer="x", layout=raw.layout, fps=60, emotions=holed.emotions)
+    for i, utterance in enumerate(holed):
+        motion = Motion(frames if i == 0 else utterance.motion.frames, 60, raw.layout)
+        copy.add_utterance(Record(utterance.id, sentence=utterance.sentence), utterance.speech, motion)
+    assert LDS(**QUICK).fit(copy).facts["frames_left_out_for_gaps"] == 20
+
+
+def test_thirty_frames_are_refused_with_how_many_are_needed(corpus, tmp_path):
+    one = corpus[corpus.ids[0]]
+    short = Corpus.create(tmp_path / "short", performer="x", layout=corpus.layout, fps=60, emotions=corpus.emotions)
+    speech = said(one.speech.audio[:8_000], 16_000)
+    short.add_utterance(Record("only"), speech, Motion(one.motion.frames[:30], 60, corpus.layout))
+    with pytest.raises(FacesynthError, match=r"at least \d+ frames are needed"):
+        LDS().fit(short)
+
+
+@pytest.mark.parametrize("what", ["sound", "motion"])
+def test_constant_recordings_are_refused(corpus, tmp_path, what):
+    flat = Corpus.create(tmp_path / what, performer="x", layout=corpus.layout, fps=60, emotions=corpus.emotions)
+    for utterance in corpus:
+        speech = said(np.zeros_like(utterance.speech.audio), 16_000) if what == "sound" else utterance.speech
+        frames = np.ones_like(utterance.motion.frames) if what == "motion" else utterance.motion.frames
+        flat.add_utterance(Record(utterance.id, sentence=utterance.sentence), speech, Motion(frames, 60, corpus.layout))
+    with pytest.raises(FacesynthError, match=f"{what} is the same in all"):
+        LDS(**QUICK).fit(flat)
+
+
+@pytest.mark.parametrize(
+    ("config", "word"),
+    [
+        ({"scale": "Log"}, "log"),
+        ({"rows": 0}, "rows"),
+        ({"stochastic_order": 1.5}, "stochastic_order"),
+        ({"lead_ms": "soon"}, "lead"),
+    ],
+)
+def test_bad_settings_are_refused(config, word):
+    with pytest.raises(FacesynthError, match=word):
+        LDS(**config)
+
+
+@pytest.mark.parametrize(("options", "word"), [({"noise": -1}, "noise"), ({"emotion": "happy"}, "emotion")])
+def test_bad_options_are_refused(corpus, model, options, word):
+    with pytest.raises(FacesynthError, match=word):
+        model.synthesize(corpus[corpus.ids[0]].speech, **options)
