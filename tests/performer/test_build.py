@@ -2,14 +2,16 @@ import numpy as np
 import pytest
 from acting import per_phone
 
+from facesynth.corpus.check import check
 from facesynth.corpus.corpus import Corpus
 from facesynth.errors import FacesynthError
 from facesynth.motion.lips import lip_gap
 from facesynth.performer import build, stage
+from facesynth.performer import capture as stage_capture
 from facesynth.performer.build import build_performer
 from facesynth.performer.script import Sentence, load_script
 from facesynth.performer.takes import takes_of
-from facesynth.performer.truth import read_truth
+from facesynth.performer.truth import contaminated_nodes, read_truth
 from facesynth.speech.phones import BILABIALS
 
 SCRIPT = (Sentence(1, "Stop it right now!"), Sentence(2, "Maybe my mother was home."))
@@ -132,6 +134,15 @@ def test_a_clean_build_has_no_faults(short_script, tmp_path, monkeypatch):
     corpus = build_performer("small", path=tmp_path / "c", workers=1, clean=True)
     assert not any(read_truth(corpus.path).values())
     assert all(np.isfinite(corpus.raw_motion(utterance).frames).all() for utterance in corpus.ids)
+
+
+def test_the_corpus_check_finds_contaminated_takes(short_script, tmp_path, monkeypatch):
+    monkeypatch.setattr(stage_capture, "CONTAMINATED_SHARE", 1.0)
+    corpus = build_performer("small", path=tmp_path / "c", workers=1)
+    contaminated = {node.split(":")[0] for node in contaminated_nodes(read_truth(corpus.path))}
+    found = {record.id for problem in check(corpus) for record in corpus.records if record.id in problem.file}
+    assert len(contaminated) == len(corpus)
+    assert len(contaminated & found) >= 0.75 * len(contaminated)
 
 
 def test_takes_are_split_by_sentence():
