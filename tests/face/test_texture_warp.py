@@ -79,7 +79,7 @@ def test_level_and_vertical_edges_leave_no_holes(picture):
     corners = np.array([[0.0, 0], [WIDTH - 1, 0], [0, HEIGHT - 1], [WIDTH - 1, HEIGHT - 1]])
     mesh = mesh_of(np.array([[20.0, 10], [40, 10], [20, 30], [40, 30]]), corners)
     warper = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
-    inside = warper.interpolate(torch.from_numpy(mesh.reference).float(), torch.ones(8, 1))
+    inside = warper.interpolate(torch.from_numpy(mesh.reference).float()[None], torch.ones(1, 8, 1))
     assert (inside - 1).abs().max() < 1e-6
 
 
@@ -87,8 +87,8 @@ def test_interpolation_is_linear(mesh):
     warper = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
     vertices = torch.from_numpy(moved(mesh, 1.0)).float()
     values = 2 * vertices[:, :1] - 3 * vertices[:, 1:] + 5
-    drawn = warper.interpolate(vertices, values)[:, :, 0]
-    covered = warper.interpolate(vertices, torch.ones(len(vertices), 1))[:, :, 0] > 0.5
+    drawn = warper.interpolate(vertices[None], values[None])[0, :, :, 0]
+    covered = warper.interpolate(vertices[None], torch.ones(1, len(vertices), 1))[0, :, :, 0] > 0.5
     y, x = torch.nonzero(covered, as_tuple=True)
     torch.testing.assert_close(drawn[y, x], (2 * x - 3 * y + 5).float(), atol=1e-3, rtol=0)
     assert (drawn[~covered] == 0).all()
@@ -119,3 +119,12 @@ def test_meshes_need_an_area():
         ringed_mesh(np.column_stack([np.arange(5.0), np.arange(5.0)]))
     with pytest.raises(FacesynthError, match="at least 3 points"):
         ringed_mesh(np.zeros((2, 2)))
+
+
+def test_a_batch_is_its_pictures_one_by_one(mesh, picture):
+    warper = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
+    pictures = torch.cat([picture, picture.flip(2)])
+    source, target = (torch.from_numpy(np.stack([moved(mesh, 1.0, seed), moved(mesh, 1.0, seed + 5)])).float() for seed in (1, 2))
+    both = warper(pictures, source, target)
+    for i in range(2):
+        torch.testing.assert_close(both[i], warper(pictures[i : i + 1], source[i : i + 1], target[i : i + 1])[0])

@@ -29,25 +29,28 @@ class PiecewiseAffineWarp(nn.Module):
 
         Outside the target mesh the picture stays as it is.
         """
-        moved = torch.stack([self.interpolate(t, s - t) for s, t in zip(source, target, strict=True)])
-        return sample(pictures, moved)
+        return sample(pictures, self.interpolate(target, source - target))
 
     def interpolate(self, vertices: Tensor, values: Tensor) -> Tensor:
-        """Values [V, D] at vertices [V, 2], linear in each triangle, at every pixel: [H, W, D]; 0 outside the mesh.
+        """Values [N, V, D] at vertices [N, V, 2], linear in each triangle, at every pixel: [N, H, W, D]; 0 outside the mesh.
 
         Each triangle is cut into spans of pixels, row by row; a value is linear along a span, so that a pixel costs
         one multiplication and one addition and no search for its triangle.
         """
-        corners = vertices.double()[self.triangles]
-        gradient, offset = _plane(corners, values.double()[self.triangles])
+        corners = vertices.double()[:, self.triangles].flatten(0, 1)
+        gradient, offset = _plane(corners, values.double()[:, self.triangles].flatten(0, 1))
         face, row, first, length = self._spans(corners)
-        start = (gradient[face, :, 0] * first[:, None] + gradient[face, :, 1] * row[:, None] + offset[face]).to(values.dtype)
-        slope = gradient[face, :, 0].to(values.dtype)
-        span = torch.repeat_interleave(torch.arange(len(length), device=length.device), length)
-        along = torch.arange(len(span), device=length.device) - (length.cumsum(0) - length)[span]
-        out = values.new_zeros(self.height * self.width, values.shape[1])
-        out[(row * self.width + first)[span] + along] = torch.addcmul(start[span], slope[span], along[:, None].to(values.dtype))
-        return out.view(self.height, self.width, -1)
+        slope = gradient[:, :, 0].index_select(0, face)
+        start = slope * first[:, None] + gradient[:, :, 1].index_select(0, face) * row[:, None] + offset.index_select(0, face)
+        pixel = (face // len(self.triangles) * self.height + row) * self.width + first
+        span = torch.repeat_interleave(length)
+        along = torch.arange(len(span), device=span.device) - (length.cumsum(0) - length).index_select(0, span)
+        line = torch.cat([start, slope], dim=1).to(values.dtype).index_select(0, span)
+        width = values.shape[-1]
+        drawn = torch.addcmul(line[:, :width], line[:, width:], along[:, None].to(values.dtype))
+        out = values.new_zeros(len(vertices) * self.height * self.width, width)
+        out.index_copy_(0, pixel.index_select(0, span) + along, drawn)
+        return out.view(len(vertices), self.height, self.width, width)
 
     def _spans(self, corners: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Of all triangles [F, 3, 2]: the spans' triangle, row, first column and length, each [S]."""

@@ -17,7 +17,7 @@ LEADS_MS = (0.0, 40.0, -40.0, 80.0, 120.0)
 """Plainest first."""
 LEAD_ORDER = 4
 """Deterministic states while the lead is being chosen."""
-ORDERS = (1, 2, 3, 4, 6, 8, 12)
+ORDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 
 
 def choose_lead(

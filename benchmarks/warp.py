@@ -1,0 +1,72 @@
+"""Frames per second of the piecewise-affine warp at 360×288, beside scikit-image's in the same run.
+
+python benchmarks/warp.py            (scikit-image is needed for the comparison only)
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+import torch
+
+from facesynth.face.texture.mesh import mesh_of
+from facesynth.face.texture.warp import PiecewiseAffineWarp
+
+HEIGHT, WIDTH, POINTS = 288, 360, 200
+
+
+def scene(frames: int, seed: int = 0):
+    """A noise picture, a mesh over all of it, and vertices that wander by about a pixel."""
+    rng = np.random.default_rng(seed)
+    picture = rng.random((HEIGHT, WIDTH, 3), np.float32)
+    rim = [(x, y) for x in np.linspace(0, WIDTH - 1, 7) for y in (0, HEIGHT - 1)]
+    rim += [(x, y) for y in np.linspace(0, HEIGHT - 1, 6)[1:-1] for x in (0, WIDTH - 1)]
+    mesh = mesh_of(rng.uniform([8, 8], [WIDTH - 9, HEIGHT - 9], (POINTS, 2)), np.array(rim))
+    targets = mesh.vertices(mesh.reference[:POINTS] + rng.normal(scale=0.7, size=(frames, POINTS, 2)))
+    return picture, mesh, targets
+
+
+def ours(picture, mesh, targets, batch: int = 4) -> float:
+    warp = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
+    pictures = torch.from_numpy(picture).permute(2, 0, 1)[None].repeat(batch, 1, 1, 1)
+    source = torch.from_numpy(mesh.reference).float().repeat(batch, 1, 1)
+    moved = torch.from_numpy(targets).float()
+    warp(pictures, source, moved[:batch])
+    began = time.perf_counter()
+    for first in range(0, len(moved) - batch + 1, batch):
+        warp(pictures, source, moved[first : first + batch])
+    return len(moved) // batch * batch / (time.perf_counter() - began)
+
+
+def scikit_image(picture, mesh, targets) -> float:
+    from skimage.transform import PiecewiseAffineTransform, warp
+
+    began = time.perf_counter()
+    for target in targets:
+        transform = PiecewiseAffineTransform.from_estimate(target, mesh.reference)
+        warp(picture, transform, order=1, mode="edge")
+    return len(targets) / (time.perf_counter() - began)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=400)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    torch.set_num_threads(options.threads)
+    picture, mesh, targets = scene(options.frames)
+    print(f"{WIDTH}x{HEIGHT}, {len(mesh.reference)} vertices, {len(mesh.triangles)} triangles, {options.threads} threads")
+    fast = ours(picture, mesh, targets)
+    print(f"facesynth     {fast:8.1f} frames/s")
+    try:
+        slow = scikit_image(picture, mesh, targets[:4])
+    except ImportError:
+        print("scikit-image is not installed: no comparison")
+        return
+    print(f"scikit-image  {slow:8.1f} frames/s   ({fast / slow:.0f} times slower)")
+
+
+if __name__ == "__main__":
+    main()
