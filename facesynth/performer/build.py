@@ -6,6 +6,7 @@ import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path
@@ -117,6 +118,11 @@ def _recordings(jobs: Sequence[list[Take]], seed: int, clean: bool, workers: int
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+    except BrokenProcessPool:
+        raise FacesynthError(
+            "a process of the performer's build was ended from outside, perhaps for want of memory; run it again with"
+            " workers=1: it goes on where it stopped"
+        ) from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

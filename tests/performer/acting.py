@@ -1,5 +1,7 @@
 """Speech made of nothing but phones, so that acting can be tested where no voice is installed."""
 
+import os
+
 import numpy as np
 
 from facesynth.performer.performance import perform
@@ -39,3 +41,8 @@ def per_phone(track, phones: PhoneTrack, wanted, fps: float = 120.0):
     """The frames of `track` at each of the wanted phones."""
     bounds = phones.frame_bounds(fps)
     return [track[bounds[i] : bounds[i + 1] + 1] for i, label in enumerate(phones.labels) if label in wanted]
+
+
+def vanish(*_):
+    """A worker that is killed."""
+    os._exit(3)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from acting import per_phone
+from acting import per_phone, vanish
 
 from facesynth.corpus.check import check
 from facesynth.corpus.corpus import Corpus
@@ -91,6 +91,12 @@ def test_an_interrupted_build_goes_on_to_the_same_bytes(built, short_script, tmp
     monkeypatch.setattr(Corpus, "add_utterance", add)
     build_performer("small", path=folder, seed=3, workers=1)
     assert contents(folder) == contents(built.path)
+
+
+def test_a_killed_worker_is_no_traceback(short_script, tmp_path, monkeypatch):
+    monkeypatch.setattr(build, "record_takes", vanish)
+    with pytest.raises(FacesynthError, match="goes on where it stopped"):
+        build_performer("small", path=tmp_path / "c", workers=2)
 
 
 def test_what_is_built_is_not_built_again(built, short_script, monkeypatch):
