@@ -19,3 +19,9 @@ def recordings():
         return path
 
     return folder
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The checkout: configs, train and export lie beside the package."""
+    return Path(__file__).parents[1]

@@ -38,9 +38,13 @@ def explain(
     A runner-up is a node that could stand at this place with its neighbours held; `extra_cost` is
     what the whole path would cost more.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for t, node in enumerate(path):
+        if node < 0:
+            rows.append({"index": t, "phone": "pau", "node": None})
+            continue
         targets = target_costs(nodes, query, t, weights)
+        first, last = t == 0 or path[t - 1] < 0, t + 1 == len(path) or path[t + 1] < 0
         row = {
             "index": t,
             "phone": PHONES[query.phones[t]] if query.phones[t] >= 0 else "pau",
@@ -51,8 +55,8 @@ def explain(
             "constrained": t in query.fixed,
             **_rightness(nodes, query, t, int(node)),
             "target_cost": float(targets[node]),
-            **(_step(nodes, int(path[t - 1]), int(node), weights) if t else {}),
-            "runners_up": _runners_up(nodes, names, path, t, targets, weights, runners_up),
+            **({} if first else _step(nodes, int(path[t - 1]), int(node), weights)),
+            "runners_up": _runners_up(nodes, names, path, t, (first, last), targets, weights, runners_up),
         }
         rows.append(row)
     return rows
@@ -92,23 +96,33 @@ def _step(nodes: MotionNodes, i: int, j: int, weights: Weights) -> dict[str, Any
 
 
 def _runners_up(
-    nodes: MotionNodes, names: Sequence[str], path: Ints, t: int, targets: Floats, weights: Weights, count: int
+    nodes: MotionNodes,
+    names: Sequence[str],
+    path: Ints,
+    t: int,
+    edges: tuple[bool, bool],
+    targets: Floats,
+    weights: Weights,
+    count: int,
 ) -> list[dict[str, Any]]:
+    first, last = edges
+
     def cost(node: int) -> float:
         total = float(targets[node])
-        total += transition_cost(nodes, int(path[t - 1]), node, weights) if t else 0.0
-        return total + (transition_cost(nodes, node, int(path[t + 1]), weights) if t + 1 < len(path) else 0.0)
+        total += 0.0 if first else transition_cost(nodes, int(path[t - 1]), node, weights)
+        return total + (0.0 if last else transition_cost(nodes, node, int(path[t + 1]), weights))
 
-    near = _nearest(nodes, path, t, targets, weights)
+    near = _nearest(nodes, path, t, edges, targets, weights)
     ranked = sorted((cost(int(n)), int(n)) for n in near if n != path[t])[:count]
     here = cost(int(path[t]))
     return [{"node": names[n], "extra_cost": c - here} for c, n in ranked if np.isfinite(c)]
 
 
-def _nearest(nodes: MotionNodes, path: Ints, t: int, targets: Floats, weights: Weights) -> Ints:
+def _nearest(nodes: MotionNodes, path: Ints, t: int, edges: tuple[bool, bool], targets: Floats, weights: Weights) -> Ints:
+    first, last = edges
     guess = targets.copy()
-    if t:
+    if not first:
         guess += ((start_vectors(nodes, weights) - end_vectors(nodes, weights)[path[t - 1]]) ** 2).sum(axis=1)
-    if t + 1 < len(path):
+    if not last:
         guess += ((end_vectors(nodes, weights) - start_vectors(nodes, weights)[path[t + 1]]) ** 2).sum(axis=1)
     return np.argsort(guess, kind="stable")[:CLOSEST]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -20,6 +20,7 @@ from facesynth.methods.efase.explanation import explain, shares
 from facesynth.methods.efase.intensity import blend, close_lips
 from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.methods.efase.penalty import median_transition
+from facesynth.methods.efase.plan import Plan, plan_speech
 from facesynth.methods.efase.search import Path, SearchIndex, build_index, search
 from facesynth.methods.efase.trees import Forest
 from facesynth.methods.method import Method
@@ -35,20 +36,13 @@ FOREST_FIELDS = ("order", "starts", "stops", "left", "right", "centres", "radii"
 NEUTRAL = "neutral"
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The result of a search, before it becomes motion."""
-
-    query: Query
-    path: Path
-
-
 @register("efase")
 class Efase(Method):
     """Constrained dynamic programming over captured motion nodes (Deng & Neumann 2008).
 
     The weights alpha … phi are those of the cost (see `Weights`); `penalty` is PNT as a multiple of
-    the median rule-2 transition of the database; `database_fps` the rate at which nodes are cut.
+    the median rule-2 transition of the database; `database_fps` the rate at which nodes are cut, `bridge_pauses`
+    whether silence is a step of the search (see `plan`).
     """
 
     pca: Pca
@@ -72,6 +66,7 @@ class Efase(Method):
         gamma: float = 0.2903,
         delta: float = 0.315,
         phi: float = 0.109,
+        bridge_pauses: bool = False,
         smoothing_firm: float = 2.0,
         smoothing_loose: float = 0.5,
         smoothing_s: float = 0.025,
@@ -130,12 +125,15 @@ class Efase(Method):
     def plan(self, speech: Speech, *, emotion: str | None = None, constraints: Mapping[int, str] | None = None) -> Plan:
         """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
         query = self._query(speech, emotion, constraints or {})
+        return plan_speech(query, self._search, bridge_pauses=self.config["bridge_pauses"])
+
+    def _search(self, query: Query) -> Path:
         if self.node_frames.device.type == "cpu":
-            return Plan(query, search(self.index(), query))
+            return search(self.index(), query)
         nodes, weights = self.nodes(), self.weights()
         if self._transitions is None:
             self._transitions = transition_matrix(nodes, weights, str(self.node_frames.device))
-        return Plan(query, dense_search(nodes, query, weights, self._transitions))
+        return dense_search(nodes, query, weights, self._transitions)
 
     def synthesize(
         self,
@@ -146,6 +144,7 @@ class Efase(Method):
         constraints: Mapping[int, str] | None = None,
     ) -> Motion:
         """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name."""
+        _ = self.fitted_layout
         _, bounds = self._phones(speech)
         intensity = speech.emotions.per_phone(speech.phones)[1]
         frames = self._decode(speech, self.plan(speech, constraints=constraints))
@@ -160,18 +159,18 @@ class Efase(Method):
     def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
         """Chosen node, cost terms and runners-up for each phone."""
         plan = self.plan(speech, constraints=constraints)
-        return explain(self.nodes(), self.facts["names"], self.emotions, plan.query, plan.path.nodes, self.weights())
+        return explain(self.nodes(), self.facts["names"], self.emotions, plan.query, plan.nodes, self.weights())
 
     def report(self, speech: Speech) -> dict[str, float]:
         """Shares of phones said by another phone, viseme class or emotion."""
         plan = self.plan(speech)
-        return shares(self.nodes(), plan.query, plan.path.nodes)
+        return shares(self.nodes(), plan.query, plan.nodes)
 
     def joins(self, speech: Speech) -> np.ndarray:
         """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
         plan = self.plan(speech)
         labels, bounds = speech.phones.labels, speech.phones.frame_bounds(self.fps)
-        return joints(self.nodes(), plan.path.nodes, labels, bounds)
+        return joints(self.nodes(), plan.nodes, labels, bounds)
 
     def rest_of(self, speech: Speech, emotion: str | None = None) -> Floats:
         """[P, D] the rest pose at each phone, in its emotion or in the one given."""
@@ -230,7 +229,7 @@ class Efase(Method):
         labels, bounds = self._phones(speech)
         rest = self.rest_of(speech, emotion)
         fps = self.config["database_fps"]
-        coordinates = concatenate(self.nodes(), plan.path.nodes, labels, bounds, rest, fps, self.smoothing)
+        coordinates = concatenate(self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing)
         return decode(self.pca, coordinates)
 
 

@@ -1,0 +1,52 @@
+"""Searching for a whole input: one search for each stretch of speech between silences.
+
+The database has no silence, and a node recorded right after a pause has no predecessor. With `pau`
+as a step of the search, as the paper writes it, such a node costs alpha · PNT exactly where it fits
+best, so by default each stretch between silences is searched for itself, which also keeps the memory
+of a long input small. `bridge_pauses` gives the paper's reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from facesynth.methods.efase.costs import Query
+from facesynth.methods.efase.nodes import Ints
+from facesynth.methods.efase.search import Path
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The result of a search, before it becomes motion."""
+
+    query: Query
+    nodes: Ints
+    """[P] a node for each phone of the input; -1 in silence between searches."""
+    cost: float
+
+
+def plan_speech(query: Query, search: Callable[[Query], Path], *, bridge_pauses: bool) -> Plan:
+    """Search each stretch of the query, or all of it at once."""
+    nodes = np.full(len(query), -1, np.int64)
+    cost = 0.0
+    for places in [np.arange(len(query))] if bridge_pauses else stretches(query.phones):
+        path = search(part(query, places))
+        nodes[places] = path.nodes
+        cost += path.cost
+    return Plan(query, nodes, cost)
+
+
+def stretches(phones: Ints) -> list[Ints]:
+    """Positions of each run of phones that are not silence (-1)."""
+    spoken = np.flatnonzero(phones >= 0)
+    return [run for run in np.split(spoken, np.flatnonzero(np.diff(spoken) > 1) + 1) if len(run)]
+
+
+def part(query: Query, places: Ints) -> Query:
+    """The query at consecutive positions."""
+    first = int(places[0])
+    fixed = {t - first: node for t, node in query.fixed.items() if first <= t <= places[-1]}
+    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed)
