@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,9 +13,8 @@ from facesynth.errors import FacesynthError
 from facesynth.progress import track
 from facesynth.speech.audio import require_sound
 from facesynth.speech.fitting import Fitted, fit_phones, fit_words
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
-from facesynth.speech.segments import Segment, phone_track
+from facesynth.speech.segments import Segment, in_one, phone_track
 from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.transcript import words_of
 
@@ -25,7 +24,6 @@ PIECE_S = 15.0
 """Longer sounds are cut at pauses into pieces of about this length: fitting phones takes memory that grows with the
 square of the length, fitting words only with the length."""
 PAUSE_S = 0.1
-SHORTEST_PHONE_S = 0.005
 QUICKEST_PHONE_S = 0.024
 """The model cannot say a phone in less."""
 
@@ -68,9 +66,10 @@ def align(audio: NDArray[np.float32], rate: int, text: str) -> Alignment:
     fit = float(np.average([found.fit for found in whole], weights=[len(found.words) for found in whole]))
     if fit < WORST_FIT:
         raise _mismatch(text, f"fit {fit:.0f}; speech with its own words is above {WORST_FIT:.0f}")
-    starts_s = [start / rate for start, _, _ in pieces]
-    phones = _within(_moved([found.phones for found in whole], starts_s), len(audio) / rate)
-    spoken = _within(_moved([found.words for found in whole], starts_s), len(audio) / rate)
+    spans = [(start / rate, (stop - start) / rate) for start, stop, _ in pieces]
+    phones = in_one((*span, found.phones) for span, found in zip(spans, whole, strict=True))
+    spoken = in_one((*span, found.words) for span, found in zip(spans, whole, strict=True))
+    starts_s = [start_s for start_s, _ in spans]
     warnings = (*_guessed_words(words), *_doubtful(whole, starts_s))
     return Alignment(phone_track(phones, len(audio) / rate), tuple(spoken), warnings, fit)
 
@@ -113,29 +112,6 @@ def _mismatch(text: str, reason: str = "its words are not heard to the end") -> 
         f"the transcript {_quoted(text)} does not match the sound ({reason});"
         " correct the transcript, or leave it out to have the phones recognised"
     )
-
-
-def _moved(pieces: Iterable[Sequence[Segment]], starts_s: Iterable[float]) -> list[Segment]:
-    """Segments of all pieces, in seconds of the whole sound."""
-    return [
-        (label, start_s + offset_s, end_s + offset_s)
-        for piece, offset_s in zip(pieces, starts_s, strict=True)
-        for label, start_s, end_s in piece
-    ]
-
-
-def _within(segments: Sequence[Segment], duration_s: float) -> list[Segment]:
-    """Segments laid inside the sound: what reaches beyond its ends, or into the piece before, is pressed together.
-
-    Pauses that lie outside go; phones keep at least SHORTEST_PHONE_S, where the sound is long enough for that.
-    """
-    kept = [s for s in segments if s[0] != SILENCE or (s[2] > SHORTEST_PHONE_S and s[1] < duration_s - SHORTEST_PHONE_S)]
-    room = min(SHORTEST_PHONE_S, duration_s / (len(kept) + 1)) * np.arange(len(kept) + 1)
-    ends = np.maximum.accumulate(np.array([s[2] for s in kept]) - room[1:]) + room[1:]
-    ends = np.clip(ends, room[1:], duration_s - room[-2::-1])
-    starts = np.maximum([s[1] for s in kept], np.concatenate([[0.0], ends[:-1]]))
-    starts = np.minimum(starts, ends - room[1])
-    return [(s[0], float(a), float(b)) for s, a, b in zip(kept, starts, ends, strict=True)]
 
 
 def _guessed_words(words: Sequence[str]) -> list[str]:

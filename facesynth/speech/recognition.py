@@ -2,41 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.errors import FacesynthError
-from facesynth.speech.audio import require_sound
+from facesynth.progress import track
+from facesynth.speech.audio import SILENT_DB, loudest_db, require_sound
 from facesynth.speech.decoding import decode, decoder_sound, heard_time, model_file, new_decoder
+from facesynth.speech.fitting import SLOWNESS, fit_phones
 from facesynth.speech.phones import SILENCE, normalise_phone
-from facesynth.speech.segments import Segment, phone_track
+from facesynth.speech.segments import Segment, in_one, phone_track
 from facesynth.speech.speech import PhoneTrack
+from facesynth.speech.transcript import words_of
 
-SLOWNESS = 1.06
+FLUENT_FIT = -65.0
+"""Fit of likely words to the sound above which they are believed."""
+PIECE_S = 12.0
+"""Sounds are cut into pieces of about this length, at their quietest moments."""
+_BLOCK_S = 0.05
 
 
 def recognise(audio: NDArray[np.float32], rate: int) -> PhoneTrack:
-    """Phones heard in a sound [S], -1..1, at `rate` Hz, of any language, as far as English phones can say it.
+    """Phones heard in a sound [S], -1..1, at `rate` Hz, of any length.
 
-    FacesynthError where the sound is too short, silent, or holds no speech.
+    Likely English words are looked for first, because what words can follow one another says much about phones; they
+    need not be the right words to be nearly the right phones. Where none fit (songs, other languages) phones are
+    recognised singly. FacesynthError where the sound is too short, silent, or holds no speech.
     """
     require_sound(audio, rate)
-    duration_s = len(audio) / rate
-    decoder = new_decoder(allphone=model_file("en-us-phone.lm.bin"), lw=2, beam=1e-20, pbeam=1e-20)
-    decode(decoder, decoder_sound(audio, rate, SLOWNESS))
-    track = phone_track(_inside(decoder, duration_s), duration_s)
-    if set(track.labels) == {SILENCE}:
+    pieces = [
+        (start / rate, (stop - start) / rate, _phones_in(audio[start:stop], rate))
+        for start, stop in track(_pieces(audio, rate), "listen")
+    ]
+    phones = phone_track(in_one(pieces), len(audio) / rate)
+    if set(phones.labels) == {SILENCE}:
         raise FacesynthError("no speech is heard in the sound; give a recording of a voice, or a file of phones")
-    return track
+    return phones
 
 
-def _inside(decoder: Any, duration_s: float) -> Iterable[Segment]:
-    """What the decoder heard, cut to the sound."""
-    for entry in decoder.seg():
-        start_s = max(heard_time(entry.start_frame, SLOWNESS), 0.0)
-        end_s = min(heard_time(entry.end_frame + 1, SLOWNESS), duration_s)
-        if end_s - start_s > 1e-3:
-            yield normalise_phone(entry.word), start_s, end_s
+def _pieces(audio: NDArray[np.float32], rate: int) -> list[tuple[int, int]]:
+    """First sample and sample after the last of pieces of PIECE_S, give or take a third, cut where it is quietest."""
+    block = round(_BLOCK_S * rate)
+    count = len(audio) // block
+    level = np.asarray(audio[: count * block], np.float64).reshape(count, block).std(axis=1)
+    level = np.convolve(level, np.ones(5) / 5, mode="same")
+    length, slack = round(PIECE_S / _BLOCK_S), round(PIECE_S / _BLOCK_S / 3)
+    cuts = [0]
+    while count - cuts[-1] > length + slack:
+        first = cuts[-1] + length - slack
+        cuts.append(first + int(level[first : first + 2 * slack].argmin()))
+    edges = [*(cut * block + block // 2 * (cut > 0) for cut in cuts), len(audio)]
+    return list(pairwise(edges))
+
+
+def _phones_in(audio: NDArray[np.float32], rate: int) -> list[Segment]:
+    if loudest_db(audio, rate) < SILENT_DB:
+        return []
+    words = _likely_words(audio, rate)
+    found = fit_phones(audio, rate, words) if words else None
+    if found is not None and found.fit >= FLUENT_FIT:
+        return list(found.phones)
+    decoder = new_decoder(allphone=model_file("en-us-phone.lm.bin"), lw=4, beam=1e-20, pbeam=1e-20)
+    decode(decoder, decoder_sound(audio, rate, SLOWNESS[0]))
+    return list(_single_phones(decoder))
+
+
+def _likely_words(audio: NDArray[np.float32], rate: int) -> tuple[str, ...]:
+    decoder = new_decoder(lm=model_file("en-us.lm.bin"), dict=model_file("cmudict-en-us.dict"))
+    decode(decoder, decoder_sound(audio, rate, SLOWNESS[0]))
+    heard = (entry.word.partition("(")[0] for entry in _entries(decoder))
+    return words_of(" ".join(word for word in heard if word[0].isalpha() or word[0] == "'"))
+
+
+def _single_phones(decoder: Any) -> Iterator[Segment]:
+    for entry in _entries(decoder):
+        times = heard_time(entry.start_frame, SLOWNESS[0]), heard_time(entry.end_frame + 1, SLOWNESS[0])
+        yield normalise_phone(entry.word), *times
+
+
+def _entries(decoder: Any) -> Iterable[Any]:
+    return decoder.seg() or () if decoder.hyp() is not None else ()

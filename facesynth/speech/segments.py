@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ Segment = tuple[str, float, float]
 
 TOUCHING_S = 1e-6
 """Ends and starts nearer than this are one boundary."""
+SHORTEST_PHONE_S = 0.005
 
 
 def phone_track(segments: Iterable[Segment], duration_s: float | None = None) -> PhoneTrack:
@@ -50,6 +51,31 @@ def covering(track: PhoneTrack, duration_s: float) -> PhoneTrack:
     if kept and duration_s - kept[-1][2] < TOUCHING_S:
         kept[-1] = (*kept[-1][:2], duration_s)
     return phone_track(kept, duration_s)
+
+
+def in_one(pieces: Iterable[tuple[float, float, Sequence[Segment]]]) -> list[Segment]:
+    """Segments of pieces of a sound, each given with its start and length in seconds, in seconds of the whole sound."""
+    return [
+        (label, begin_s + start_s, begin_s + end_s)
+        for begin_s, length_s, segments in pieces
+        for label, start_s, end_s in within(segments, length_s)
+    ]
+
+
+def within(segments: Sequence[Segment], duration_s: float) -> list[Segment]:
+    """Segments laid inside a sound: what reaches beyond its ends is pressed together.
+
+    Pauses that lie outside go; phones keep at least SHORTEST_PHONE_S, where the sound is long enough for that.
+    """
+    kept = [s for s in segments if s[0] != SILENCE or (s[2] > SHORTEST_PHONE_S and s[1] < duration_s - SHORTEST_PHONE_S)]
+    if not kept:
+        return []
+    room = min(SHORTEST_PHONE_S, duration_s / (len(kept) + 1)) * np.arange(len(kept) + 1)
+    ends = np.maximum.accumulate(np.array([s[2] for s in kept]) - room[1:]) + room[1:]
+    ends = np.clip(ends, room[1:], duration_s - room[-2::-1])
+    starts = np.maximum([s[1] for s in kept], np.concatenate([[0.0], ends[:-1]]))
+    starts = np.minimum(starts, ends - room[1])
+    return [(s[0], float(a), float(b)) for s, a, b in zip(kept, starts, ends, strict=True)]
 
 
 def _filled(segments: Iterable[Segment], duration_s: float | None) -> Iterable[tuple[str, float]]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facesynth.errors import FacesynthError
-from facesynth.speech.alignment import _within, align
+from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, loudest_db
 from facesynth.speech.phones import SILENCE
 from facesynth.speech.pronunciation import pronunciations
@@ -90,14 +90,6 @@ def test_long_sounds_are_taken_in_pieces(say):
     got = np.array([start_s for _, start_s, _ in placed.words]).reshape(times, -1)
     wanted = alone + np.arange(times)[:, None] * len(audio) / rate
     assert np.percentile(np.abs(got - wanted), 95) < 0.05
-
-
-def test_segments_beyond_the_sound_are_laid_inside():
-    inside = _within([(SILENCE, -0.2, -0.1), ("b", -0.1, -0.05), ("aa", -0.05, 0.3), ("p", 0.3, 0.52), (SILENCE, 0.52, 0.7)], 0.5)
-    assert [label for label, _, _ in inside] == ["b", "aa", "p"]
-    assert inside[0][1] == 0.0
-    assert inside[-1][2] == 0.5
-    assert all(end_s - start_s >= 0.0049 for _, start_s, end_s in inside)
 
 
 def test_recognition_hears_most_of_a_clear_voice(say):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from facesynth.errors import FacesynthError
 from facesynth.speech.phones import PHONES
-from facesynth.speech.segments import covering, phone_track
+from facesynth.speech.segments import covering, in_one, phone_track, within
 from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.textgrid import read_label_lines, read_textgrid, write_label_lines, write_textgrid
 
@@ -129,3 +129,20 @@ def test_covering_cuts_or_completes():
 def test_overlapping_segments_are_refused():
     with pytest.raises(FacesynthError, match="segment 2"):
         phone_track([("aa", 0, 0.5), ("b", 0.3, 0.7)])
+
+
+def test_segments_beyond_the_sound_are_laid_inside():
+    inside = within([("pau", -0.2, -0.1), ("b", -0.1, -0.05), ("aa", -0.05, 0.3), ("p", 0.3, 0.52), ("pau", 0.52, 0.7)], 0.5)
+    assert [label for label, _, _ in inside] == ["b", "aa", "p"]
+    assert inside[0][1] == 0.0
+    assert inside[-1][2] == 0.5
+    assert all(end_s - start_s >= 0.0049 for _, start_s, end_s in inside)
+
+
+def test_pieces_do_not_push_one_another():
+    first = [("aa", 0.1, 0.9), ("pau", 0.9, 1.2)]
+    second = [("pau", -0.2, 0.05), ("b", 0.05, 0.1), ("pau", 0.1, 1.2)]
+    track = phone_track(in_one([(0.0, 1.0, first), (1.0, 1.0, second)]), 2.0)
+    assert track.labels == ("pau", "aa", "pau", "b", "pau")
+    np.testing.assert_allclose(track.ends_s, [0.1, 0.9, 1.05, 1.1, 2.0])
+    assert in_one([(0.0, 1.0, [])]) == []
