@@ -1,10 +1,14 @@
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.config import load_config
 from facesynth.corpus import Corpus, Record
 from facesynth.errors import FacesynthError
 from facesynth.methods.lds.innovations import Innovations
@@ -227,3 +231,19 @@ def test_bad_settings_are_refused(config, word):
 def test_bad_options_are_refused(corpus, model, options, word):
     with pytest.raises(FacesynthError, match=word):
         model.synthesize(corpus[corpus.ids[0]].speech, **options)
+
+
+def test_the_training_script_trains(corpus, tmp_path):
+    script = Path(__file__).parents[2] / "train" / "lds.py"
+    settings = tmp_path / "quick.yaml"
+    settings.write_text("".join(f"{key}: {value}\n" for key, value in QUICK.items()))
+    model = tmp_path / "model.safetensors"
+    command = [sys.executable, str(script), str(corpus.path), "--config", str(settings), "-o", str(model)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "RMS error on sentences left out" in done.stdout
+    assert isinstance(load(model), LDS)
+
+
+def test_the_shipped_settings_are_known():
+    for name in ("lds.yaml", "lds_paper.yaml"):
+        assert LDS.from_config(load_config(Path(__file__).parents[2] / "configs" / name)).config["components"] == 8
