@@ -40,8 +40,11 @@ class RbfMap(nn.Module):
         self.register_buffer("width", width)
 
     @classmethod
-    def fit(cls, centres: NDArray[Any], values: NDArray[Any], *, width: float, kernel: Kernel) -> Self:
-        """Pass through values [R, E] at centres [R, D], up to the ridge, by LU decomposition."""
+    def fit(cls, centres: NDArray[Any], values: NDArray[Any], *, width: float, kernel: Kernel, ridge: float = RIDGE) -> Self:
+        """Pass through values [R, E] at centres [R, D], up to the ridge, by LU decomposition.
+
+        ridge: share of the mean diagonal that is added to it; more of it smooths noisy values.
+        """
         if kernel not in KERNELS:
             raise unknown("kernel", kernel, KERNELS)
         if not width > 0 or len(centres) == 0 or len(centres) != len(values):
@@ -54,7 +57,7 @@ class RbfMap(nn.Module):
         at, to = apart(np.asarray(centres, np.float64), np.asarray(values, np.float64))
         system = torch.cdist(torch.from_numpy(at), torch.from_numpy(at), compute_mode="donot_use_mm_for_euclid_dist")
         matrix = _phi(system / width, kernel).numpy()
-        matrix[np.diag_indices(len(at))] += RIDGE * np.trace(matrix) / len(at)
+        matrix[np.diag_indices(len(at))] += ridge * np.trace(matrix) / len(at)
         coefficients = lu_solve(lu_factor(matrix), to)
         return cls(torch.from_numpy(at), torch.from_numpy(coefficients), torch.tensor(width, dtype=torch.float64), kernel)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import permutations
 from typing import Any, Self
 
 import numpy as np
@@ -14,23 +16,32 @@ from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
-from facesynth.methods.anime_graph.components import FaceComponents
+from facesynth.methods.anime_graph.closure import keep_shut
+from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
 from facesynth.methods.anime_graph.lowpass import cutoffs_hz, low_pass
+from facesynth.methods.anime_graph.mapping import MapSettings, Width, fit_map, matched, require_pairs
 from facesynth.methods.anime_graph.maps import EmotionMaps
+from facesynth.methods.anime_graph.parallel import Take, emotion_pairs, take_of
 from facesynth.methods.anime_graph.plan import Plan, Wish, blend, explain, make_plan
 from facesynth.methods.anime_graph.search import Weights
+from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import Stream
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
+from facesynth.motion.rbf import Kernel
 from facesynth.progress import track
 from facesynth.speech.phones import PHONES
 from facesynth.speech.speech import Speech
 
 MOST_FRAMES = 60_000
 """Of more training frames than this, evenly spaced ones are enough to find the components."""
+
+NEUTRAL = "neutral"
+EMOTION_CHANGES_S = 0.08
+"""Standard deviation of the smoothing with which mapped emotions come and go."""
 
 
 @register("anime_graph")
@@ -45,6 +56,11 @@ class AnimeGraph(Method):
         How many RASTA-PLP parameters the audio cost compares.
     jump_weight, jump_cost_weight, audio_weight : float
         The weights of eq. 2.
+    map_width, map_kernel, map_centres :
+        Of the emotion maps: `closest` (the paper), `median` or `cross-validated` width, `gaussian` or `exponential`
+        kernel, number of K-means centres.
+    emotional_components : list of int, optional
+        Which components the maps change, in place of the automatic split.
     """
 
     cutoffs_hz: torch.Tensor
@@ -57,6 +73,10 @@ class AnimeGraph(Method):
         jump_weight: float = 100.0,
         jump_cost_weight: float = 1.0,
         audio_weight: float = 0.01,
+        map_width: Width = "cross-validated",
+        map_kernel: Kernel = "exponential",
+        map_centres: int = 250,
+        emotional_components: Sequence[int] | None = None,
     ) -> None:
         super().__init__(
             variance=variance,
@@ -64,11 +84,16 @@ class AnimeGraph(Method):
             jump_weight=jump_weight,
             jump_cost_weight=jump_cost_weight,
             audio_weight=audio_weight,
+            map_width=map_width,
+            map_kernel=map_kernel,
+            map_centres=map_centres,
+            emotional_components=emotional_components,
         )
         self.weights = Weights(jump_weight, jump_cost_weight, audio_weight)
         self.audio = AudioFeatures(parameters)
         self.components = FaceComponents()
         self.maps = EmotionMaps()
+        self.map_settings = MapSettings(map_width, map_kernel, map_centres)
         self.nodes = nn.Module()
         self._chooser: Chooser | None = None
 
@@ -82,16 +107,77 @@ class AnimeGraph(Method):
         some = frames[:: max(1, len(frames) // MOST_FRAMES)]
         self.components.fit(some, corpus.layout, variance=self.config["variance"], seed=seed)
         builder = GraphBuilder(self.components, self.audio, self.emotions, corpus.removed_nodes())
+        takes = []
         for utterance in track(corpus, "anime graph", len(corpus)):
             builder.add(utterance)
+            takes.append(take_of(utterance, self.components))
         graph = builder.build()
         for name, tensor in graph.tensors().items():
             self.nodes.register_buffer(name, tensor)
         runs = (graph.frames[a:b] for a, b in sorted(set(zip(graph.run_starts, graph.run_stops, strict=True))))
         self.register_buffer("cutoffs_hz", torch.from_numpy(cutoffs_hz(runs, self.fps)))
         self.facts["utterances"] = list(corpus.ids)
+        self._fit_maps([take for take in takes if take is not None], seed)
         self._chooser = None
         return self
+
+    def _fit_maps(self, takes: Sequence[Take], seed: int) -> None:
+        """A map for every ordered pair of emotions; why there is none is kept for those who ask for it."""
+        self.facts["no_map"], maps = {}, {}
+        pairs = list(permutations(self.emotions, 2))
+        counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
+        self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
+        for source, target in track(pairs, "emotion maps"):
+            try:
+                require_pairs(self.split, counts[source, target], source, target)
+            except FacesynthError as error:
+                self.facts["no_map"][f"{source} {target}"] = str(error)
+                continue
+            samples = matched(takes, self.split, source, target)
+            numbers = (self.emotions.index(source), self.emotions.index(target))
+            maps[numbers] = fit_map(samples, self.map_settings, seed=seed)
+        self.maps.fill(maps, self.split.emotional)
+
+    def _split(self, takes: Sequence[Take], seed: int) -> Split:
+        override = self.config["emotional_components"]
+        split = split_components(takes, self.components, self.fitted_layout, override, seed=seed)
+        self.facts["components"] = split.report(BLOCKS, self.components.block.tolist())
+        return split
+
+    def map_emotion(self, motion: Motion, source: str, target: str, *, intensity: NDArray[np.float64] | float = 1.0) -> Motion:
+        """Any motion of the learned layout, recorded or synthesised by any method, from one emotion to another.
+
+        intensity: 0 leaves the motion, 1 maps it fully; a number or one per frame [T]. What the components do not
+        hold stays, lips that were shut stay shut, and frames with missing samples stay missing.
+        """
+        number = self._map_number(source, target)
+        self._check_layout(motion)
+        if number is None:
+            return motion
+        frames = motion.frames.astype(np.float64)
+        before = self.components.encode_array(np.nan_to_num(frames))
+        change = self.maps.apply_array(before, number, intensity) - before
+        changed = frames + change @ self.components.mixing.numpy().T
+        return replace(motion, frames=keep_shut(changed, frames, motion.layout).astype(np.float32))
+
+    def _map_number(self, source: str, target: str) -> int | None:
+        """Number of a map, None from an emotion to itself; FacesynthError where there is none."""
+        for name in (source, target):
+            if name not in self.emotions:
+                raise unknown("emotion", name, self.emotions)
+        if source == target:
+            return None
+        number = self.maps.find(self.emotions.index(source), self.emotions.index(target))
+        if number is None:
+            raise FacesynthError(self.facts["no_map"][f"{source} {target}"])
+        return number
+
+    def _check_layout(self, motion: Motion) -> None:
+        if (motion.layout.kind, motion.layout.names) != (self.fitted_layout.kind, self.fitted_layout.names):
+            raise FacesynthError(
+                f"this model maps motion of its own layout ({len(self.fitted_layout.names)} {self.fitted_layout.kind}); "
+                f"got {len(motion.layout.names)} {motion.layout.kind} with other names"
+            )
 
     @property
     def chooser(self) -> Chooser:
@@ -106,16 +192,49 @@ class AnimeGraph(Method):
         """The anime graph."""
         return self.chooser.graph
 
-    def synthesize(  # type: ignore[override]
-        self, speech: Speech, *, seed: int = 0, look_ahead: int | None = None
+    def synthesize(
+        self,
+        speech: Speech,
+        *,
+        seed: int = 0,
+        look_ahead: int | None = None,
+        to_emotion: str | None = None,
+        to_intensity: float = 1.0,
     ) -> Motion:
         """Motion for new speech. Nothing is random: `seed` changes nothing.
 
-        `look_ahead`: search that many phones ahead, as for streaming, in place of the whole utterance.
+        look_ahead: search that many phones ahead, as for streaming, in place of the whole utterance.
+        to_emotion, to_intensity: find motion in the speech's own emotion and map it to this one.
         """
         plan = self.plan(speech, look_ahead=look_ahead)
         moved, _ = blend(self.chooser, plan, self.fps)
-        return self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps))
+        motion = self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps))
+        motion = self._with_intensity(motion, speech)
+        return self._mapped_to(motion, speech, to_emotion, to_intensity) if to_emotion is not None else motion
+
+    def _mapped_to(self, motion: Motion, speech: Speech, target: str, intensity: float) -> Motion:
+        for source in sorted(set(speech.emotions.labels) - {target}):
+            motion = self.map_emotion(motion, source, target, intensity=intensity * self._felt(speech, source))
+        return motion
+
+    def _with_intensity(self, motion: Motion, speech: Speech) -> Motion:
+        """An emotion of intensity I is mapped towards neutral by 1 - I; where no map leads there, it stays whole."""
+        track = speech.emotions
+        for source in sorted(set(track.labels) & set(self.emotions) - {NEUTRAL}):
+            weak = self._felt(speech, source, 1 - track.intensities)
+            mapped = NEUTRAL in self.emotions and f"{source} {NEUTRAL}" not in self.facts["no_map"]
+            if mapped and weak.max() > 0:
+                motion = self.map_emotion(motion, source, NEUTRAL, intensity=weak)
+        return motion
+
+    def _felt(self, speech: Speech, emotion: str, amount: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+        """[T] amount (of each interval of the emotion track) where the emotion is felt, 0 elsewhere; smooth over time."""
+        from scipy.ndimage import gaussian_filter1d
+
+        track, count = speech.emotions, int(speech.phones.frame_bounds(self.fps)[-1])
+        felt = np.array([label == emotion for label in track.labels]) * amount
+        over_time = felt[track.index_at(np.arange(count) / self.fps)]
+        return gaussian_filter1d(over_time, EMOTION_CHANGES_S * self.fps, mode="nearest")
 
     def stream(self, wishes: Iterable[Wish], *, look_ahead: int = 4) -> Iterator[NDArray[np.float32]]:
         """Frames [n, C] while phones arrive; `look_ahead` phones (the paper: 3 to 6) are waited for."""

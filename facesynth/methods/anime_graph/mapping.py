@@ -1,0 +1,119 @@
+"""Learning emotion maps from parallel sentences (Cao 2005, §5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
+from facesynth.methods.anime_graph.split import Split
+from facesynth.motion.rbf import KERNELS, Kernel, RbfMap, closest_distance, cluster_means, median_distance
+
+Width = Literal["closest", "median", "cross-validated"]
+WIDTHS: tuple[Width, ...] = ("closest", "median", "cross-validated")
+FEWEST_SENTENCES = 3
+"""Parallel sentences without which a map is not learned (the paper had ten)."""
+MOST_SAMPLES = 6000
+"""Neighbouring frames repeat each other: of more aligned frames than this, evenly spaced ones are clustered."""
+WIDTH_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Widths that cross-validation tries, in median distances of the centres."""
+RIDGES = (1e-6, 1e-3, 1e-1)
+"""Ridges that it tries with each: recordings of one sentence differ from take to take, which is noise to a map."""
+FOLDS = 4
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """How a map is fitted."""
+
+    width: Width = "cross-validated"
+    kernel: Kernel = "exponential"
+    centres: int = 250
+
+    def __post_init__(self) -> None:
+        if self.width not in WIDTHS:
+            raise unknown("width", self.width, WIDTHS)
+        if self.kernel not in KERNELS:
+            raise unknown("kernel", self.kernel, KERNELS)
+        if self.centres < 1:
+            raise FacesynthError(f"a map needs at least one centre; got {self.centres}")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Frames of one sentence in two emotions, matched by what is said."""
+
+    source: Floats
+    """[T, E] emotional components in the first emotion."""
+    target: Floats
+    """[T, E] in the second."""
+    sentence: str
+
+
+def matched(takes: Sequence[Take], split: Split, source: str, target: str) -> list[Samples]:
+    """Matched emotional components of every parallel sentence; aligned by the speech components alone."""
+    return [
+        Samples(a.components[:, split.emotional], b.components[aligned(a, b, split.speech)][:, split.emotional], a.sentence)
+        for a, b in emotion_pairs(takes, source, target)
+    ]
+
+
+def require_pairs(split: Split, sentences: int, source: str, target: str) -> None:
+    """FacesynthError where a map from one emotion to another cannot be learned."""
+    if sentences < FEWEST_SENTENCES:
+        raise FacesynthError(
+            f"mapping {source} to {target} needs at least {FEWEST_SENTENCES} sentences recorded in both (ten are good); "
+            f"the corpus has {sentences}"
+        )
+    if not len(split.emotional):
+        raise FacesynthError(
+            f"mapping {source} to {target} is impossible: no component of this corpus' motion changes with emotion; "
+            "name some with `emotional_components`"
+        )
+
+
+def fit_map(samples: Sequence[Samples], settings: MapSettings, *, seed: int = 0) -> RbfMap:
+    """The displacement `e_j - e_i` as a function of e_i, through K-means centres (eq. 10)."""
+    x, shift = _stacked(samples)
+    centres, values = cluster_means(x, shift, settings.centres, seed=seed)
+    if settings.width == "closest":
+        # The kernels as printed, exp(-x/d) and exp(-x²/d), d the distance of the two closest samples.
+        d = closest_distance(x)
+        width = d if settings.kernel == "exponential" else float(np.sqrt(d))
+        return RbfMap.fit(centres, values, width=width, kernel=settings.kernel)
+    width = median_distance(centres)
+    if settings.width == "median":
+        return RbfMap.fit(centres, values, width=width, kernel=settings.kernel)
+    factor, ridge = _cross_validated(samples, settings, seed)
+    return RbfMap.fit(centres, values, width=factor * width, kernel=settings.kernel, ridge=ridge)
+
+
+def _stacked(samples: Sequence[Samples]) -> tuple[Floats, Floats]:
+    x, y = (np.concatenate([getattr(s, side) for s in samples]) for side in ("source", "target"))
+    step = max(1, -(-len(x) // MOST_SAMPLES))
+    return x[::step], (y - x)[::step]
+
+
+def _cross_validated(samples: Sequence[Samples], settings: MapSettings, seed: int) -> tuple[float, float]:
+    """Width factor and ridge with the least squared error on sentences left out."""
+    sentences = sorted({s.sentence for s in samples})
+    error = dict.fromkeys(product(WIDTH_FACTORS, RIDGES), 0.0)
+    for fold in range(min(FOLDS, len(sentences))):
+        left_out = set(sentences[fold::FOLDS])
+        x, shift = _stacked([s for s in samples if s.sentence not in left_out])
+        centres, values = cluster_means(x, shift, settings.centres, seed=seed)
+        width = median_distance(centres)
+        asked, wanted = _stacked([s for s in samples if s.sentence in left_out])
+        for factor, ridge in error:
+            rbf = RbfMap.fit(centres, values, width=factor * width, kernel=settings.kernel, ridge=ridge)
+            error[factor, ridge] += float(np.square(rbf(torch.from_numpy(asked)).numpy() - wanted).sum())
+    return min(error, key=lambda key: error[key])

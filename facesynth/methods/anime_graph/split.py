@@ -1,0 +1,150 @@
+"""Which components carry speech, and which emotion (Cao 2005, §5.1.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+from facesynth.methods.anime_graph.components import FaceComponents, block_columns
+from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs, retakes
+from facesynth.motion.layout import Layout
+
+RATIO = 2.0
+"""A component is emotional when emotions change it this much more (RMS) than another take of the same does."""
+CHANCE = 0.05
+"""… and when the chance that shuffled pairs differ as much is smaller than this."""
+MOUTH_SHARE = 0.02
+"""A component is speech when it explains this share of the mouth's motion within sentences."""
+MOSTLY_SPEECH = 0.25
+"""A component that explains more than this share of it is never counted as emotional: it would carry the words along."""
+SHUFFLES = 999
+MOST_PAIRS = 60
+"""Pairs of one kind that are compared."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Scores of the D components, and what they are taken for."""
+
+    ratio: Floats
+    """[D] RMS difference between emotions over that between takes of one emotion."""
+    chance: Floats
+    """[D] p-value of that by permutation."""
+    mouth_share: Floats
+    """[D] share of the mouth's motion that each component explains alone."""
+    emotional: NDArray[np.int64]
+    speech: NDArray[np.int64]
+    yardstick: str
+    """`takes`, or, in corpora without second takes, `sentences`."""
+
+    def report(self, blocks: Sequence[str], block: Sequence[int]) -> list[dict[str, Any]]:
+        """One row for each component, for people and for JSON."""
+        kinds = {**dict.fromkeys(self.speech.tolist(), "speech"), **dict.fromkeys(self.emotional.tolist(), "emotion")}
+        return [
+            {
+                "component": n,
+                "block": blocks[block[n]],
+                "is": kinds.get(n, "neither"),
+                "emotion_ratio": round(float(self.ratio[n]), 3),
+                "chance": round(float(self.chance[n]), 4),
+                "mouth_share": round(float(self.mouth_share[n]), 4),
+                "yardstick": self.yardstick,
+            }
+            for n in range(len(self.ratio))
+        ]
+
+
+_NO_SCORES, _NONE = np.zeros(0), np.zeros(0, np.int64)
+NOTHING_SPLIT = Split(_NO_SCORES, _NO_SCORES, _NO_SCORES, _NONE, _NONE, "none")
+"""Of a corpus in which no sentence was recorded in two emotions."""
+
+
+def split_components(
+    takes: Sequence[Take], components: FaceComponents, layout: Layout, override: Sequence[int] | None, *, seed: int
+) -> Split:
+    """Score every component and split; `override` names the emotional ones and leaves the scores a report.
+
+    In a corpus without second takes the yardstick is how much the emotional difference itself varies from sentence
+    to sentence: what is constant over sentences is emotion.
+    """
+    share = mouth_shares(takes, components, layout)
+    by = np.flatnonzero(share >= MOUTH_SHARE)
+    by = by if len(by) else np.array([int(share.argmax())])
+    between = _differences(_some([p for a, b in _emotion_names(takes) for p in emotion_pairs(takes, a, b)]), by)
+    within = _differences(_some(retakes(takes)), by)
+    rng = np.random.default_rng(seed)
+    if len(within) >= 2:
+        ratio, chance = _against_takes(_squares(between), _squares(within), rng)
+    else:
+        ratio, chance = _against_sentences(np.array([d.mean(axis=0) for d in between]), rng)
+    if override is None:
+        emotional = np.flatnonzero((ratio >= RATIO) & (chance < CHANCE) & (share <= MOSTLY_SPEECH))
+    else:
+        emotional = np.unique(np.asarray(override, np.int64))
+        if len(emotional) and not 0 <= emotional[0] <= emotional[-1] < components.count:
+            raise FacesynthError(f"emotional components must be 0 to {components.count - 1}; got {list(override)}")
+    speech = np.setdiff1d(by, emotional)
+    if not len(speech):
+        speech = np.setdiff1d(np.arange(components.count), emotional)[:1]
+    return Split(ratio, chance, share, emotional, speech, "takes" if len(within) >= 2 else "sentences")
+
+
+def mouth_shares(takes: Sequence[Take], components: FaceComponents, layout: Layout) -> Floats:
+    """[D] share of the mouth's motion within sentences that eq. 9, the motion rebuilt from one component, explains."""
+    group = next((g for g in ("mouth", "lips_inner", "lips_outer", "jaw") if g in layout.groups), None)
+    columns = layout.columns(group) if group else block_columns(layout)[0]
+    mixing = components.mixing.numpy()[columns]
+    total, left = 0.0, np.zeros(components.count)
+    for take in takes:
+        moved = take.frames[:, columns] - take.frames[:, columns].mean(axis=0)
+        u = take.components - take.components.mean(axis=0)
+        total += float(np.square(moved).sum())
+        explained = 2 * (u * (moved @ mixing)).sum(axis=0) - np.square(u).sum(axis=0) * np.square(mixing).sum(axis=0)
+        left += explained
+    return left / max(total, np.finfo(float).tiny)
+
+
+def _emotion_names(takes: Sequence[Take]) -> list[tuple[str, str]]:
+    return list(combinations(sorted({t.emotion for t in takes}), 2))
+
+
+def _some(pairs: Sequence[tuple[Take, Take]]) -> Sequence[tuple[Take, Take]]:
+    return pairs[:: max(1, -(-len(pairs) // MOST_PAIRS))]
+
+
+def _differences(pairs: Sequence[tuple[Take, Take]], by: NDArray[np.int64]) -> list[Floats]:
+    """[T, D] aligned difference of each pair."""
+    return [a.components - b.components[aligned(a, b, by)] for a, b in pairs]
+
+
+def _squares(differences: Sequence[Floats]) -> Floats:
+    return np.array([np.square(d).mean(axis=0) for d in differences])
+
+
+def _against_takes(between: Floats, within: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Ratio [D] of RMS differences, and how often shuffled pairs [n, D] reach it."""
+
+    def ratio(values: Floats) -> Floats:
+        return np.sqrt(values[: len(between)].mean(axis=0) / np.maximum(values[len(between) :].mean(axis=0), 1e-12))
+
+    values = np.concatenate([between, within])
+    found = ratio(values)
+    reached = np.sum([ratio(rng.permutation(values)) >= found for _ in range(SHUFFLES)], axis=0)
+    return found, (reached + 1) / (SHUFFLES + 1)
+
+
+def _against_sentences(offsets: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Ratio [D] of the size of offsets [n, D] to their spread, and how often random signs reach their mean."""
+    spread = np.maximum(offsets.std(axis=0), 1e-6)
+    found = np.abs(offsets.mean(axis=0))
+    signs = rng.choice([-1.0, 1.0], (SHUFFLES, len(offsets)))
+    reached = (np.abs(signs @ offsets / len(offsets)) >= found).sum(axis=0)
+    return np.sqrt(np.square(offsets).mean(axis=0)) / spread, (reached + 1) / (SHUFFLES + 1)
