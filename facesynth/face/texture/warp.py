@@ -66,13 +66,14 @@ class PiecewiseAffineWarp(nn.Module):
 
 
 def sample(pictures: Tensor, displacement: Tensor) -> Tensor:
-    """Pictures [N, channels, H, W] read bilinearly at each pixel plus displacement [N, H, W, 2] px."""
+    """Pictures [N, channels, H, W] read bilinearly at each pixel plus its displacement [N, h, w, 2] px: [N, channels, h, w]."""
     height, width = pictures.shape[-2:]
-    y, x = torch.meshgrid(
-        torch.linspace(-1, 1, height, device=pictures.device), torch.linspace(-1, 1, width, device=pictures.device), indexing="ij"
-    )
+    rows, columns = displacement.shape[1:3]
     scale = torch.tensor([2 / max(width - 1, 1), 2 / max(height - 1, 1)], device=pictures.device)
-    grid = torch.stack([x, y], dim=-1) + displacement * scale
+    y, x = torch.meshgrid(
+        torch.arange(rows, device=pictures.device), torch.arange(columns, device=pictures.device), indexing="ij"
+    )
+    grid = (torch.stack([x, y], dim=-1) + displacement) * scale - 1
     return nn.functional.grid_sample(pictures, grid, mode="bilinear", padding_mode="border", align_corners=True)
 
 

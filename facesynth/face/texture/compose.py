@@ -1,0 +1,149 @@
+"""The speaker's face on synthesised shapes: warped training pictures over the speaker's own video, with a soft border."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facesynth.errors import FacesynthError
+from facesynth.face.texture.mesh import Mesh, ringed_mesh
+from facesynth.face.texture.shapes import Similarities
+from facesynth.face.texture.sources import coherent, nearest
+from facesynth.face.texture.speaker import Speaker
+from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+
+BATCH = 4
+MARGIN_PX = 4
+LARGEST_GAIN = 1.3
+
+Choice = Literal["coherent", "nearest"]
+
+
+@dataclass
+class Report:
+    """What drawing took and how it went; complete when the last picture is drawn."""
+
+    frames: int = 0
+    seconds: float = 0.0
+    folded_triangles: int = 0
+    """Triangles turned over, summed over frames: the picture is torn there."""
+    jumps: int = 0
+    """How often the next picture was not the one recorded next."""
+    fps: float = field(default=25.0)
+
+    @property
+    def real_time_factor(self) -> float:
+        """Seconds of drawing for a second of video."""
+        return self.seconds * self.fps / max(self.frames, 1)
+
+
+class TexturedFace:
+    """Draws shapes as pictures of the speaker.
+
+    Each frame takes a background from the speaker's video, with the head as it was there, and a training picture whose
+    shape is near the wanted one. The training picture is warped so that its points come to lie where the wanted
+    shape has them, on the background's head, and faded in over the ring around the points. Its brightness is
+    matched to the background's, since light and camera drift between clips.
+    """
+
+    def __init__(self, speaker: Speaker, device: str | torch.device = "cpu") -> None:
+        self.speaker = speaker
+        self.device = torch.device(device)
+        self.mesh: Mesh = ringed_mesh(speaker.shapes.mean(axis=0))
+        self.height, self.width = speaker.pictures.shape[1:3]
+        self._opacity = torch.from_numpy(self.mesh.opacity).float().to(self.device)
+        self._looks = speaker.looks
+
+    def draw(
+        self,
+        shapes: NDArray[np.float64],
+        background: NDArray[np.int64],
+        report: Report,
+        choice: Choice = "coherent",
+    ) -> Iterator[NDArray[np.uint8]]:
+        """Pictures [H, W, 3] for shapes [T, K, 2] (head-fixed px) over the speaker's pictures number `background` [T]."""
+        if len(shapes) != len(background):
+            raise FacesynthError(f"every shape needs a background; got {len(shapes)} shapes and {len(background)} backgrounds")
+        sources = self.choose(shapes, choice)
+        following = (np.diff(sources) == 0) | ((np.diff(sources) == 1) & ~self.speaker.clip_starts[sources[1:]])
+        report.jumps, report.fps = int((~following).sum()), self.speaker.fps
+        for first in range(0, len(shapes), BATCH):
+            began = time.perf_counter()
+            part = slice(first, first + BATCH)
+            pictures, folded = self._drawn(shapes[part], sources[part], background[part])
+            report.folded_triangles += folded
+            report.frames += len(pictures)
+            report.seconds += time.perf_counter() - began
+            yield from pictures
+
+    def choose(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
+        """[T] number of the training picture for each shape."""
+        if choice == "nearest":
+            return nearest(shapes, self.speaker.shapes)
+        return coherent(shapes, self.speaker.shapes, self._looks, self.speaker.clip_starts)
+
+    @torch.no_grad()
+    def _drawn(
+        self, shapes: NDArray[np.float64], sources: NDArray[np.int64], background: NDArray[np.int64]
+    ) -> tuple[NDArray[np.uint8], int]:
+        target = self._placed(shapes, background)
+        source = self._placed(self.speaker.shapes[sources], sources)
+        folded = int(self.mesh.folded(target).sum())
+        left, top, right, bottom = self._window(target)
+        behind = self.speaker.pictures[background]
+        box = torch.from_numpy(behind[:, top:bottom, left:right]).to(self.device).permute(0, 3, 1, 2).float()
+        pictures = torch.from_numpy(self.speaker.pictures[sources]).to(self.device).permute(0, 3, 1, 2).float()
+        warp = PiecewiseAffineWarp(torch.from_numpy(self.mesh.triangles), bottom - top, right - left).to(self.device)
+        corner = torch.tensor([left, top], device=self.device)
+        wanted = torch.from_numpy(target).float().to(self.device) - corner
+        there = torch.from_numpy(source).float().to(self.device)
+        values = torch.cat([there - wanted, self._opacity.expand(len(wanted), -1)[:, :, None]], dim=2)
+        drawn = warp.interpolate(wanted, values)
+        opacity = drawn[..., 2].clamp(0, 1)
+        warped = sample(pictures, drawn[..., :2])
+        blended = _over(box, matched(warped, box, opacity), _smooth(opacity))
+        out = behind.copy()
+        out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()
+        return out, folded
+
+    def _placed(self, shapes: NDArray[np.float64], pictures: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Vertices [T, V, 2] px of head-fixed shapes on the heads of these pictures."""
+        head = Similarities(self.speaker.linear[pictures], self.speaker.shift[pictures])
+        return head.to_picture(self.mesh.vertices(shapes))
+
+    def _window(self, vertices: NDArray[np.float64]) -> tuple[int, int, int, int]:
+        """Left, top, right, bottom px of the part of the picture that changes."""
+        low = np.floor(vertices.min(axis=(0, 1))).astype(int) - MARGIN_PX
+        high = np.ceil(vertices.max(axis=(0, 1))).astype(int) + MARGIN_PX
+        left, top = np.clip(low, 0, [self.width - 2, self.height - 2])
+        right, bottom = np.clip(high, [left + 2, top + 2], [self.width, self.height])
+        return int(left), int(top), int(right), int(bottom)
+
+
+def matched(warped: Tensor, behind: Tensor, opacity: Tensor) -> Tensor:
+    """`warped` [N, 3, h, w] with each channel's brightness scaled to that of `behind` in the border, where both are seen."""
+    border = ((opacity > 0.02) & (opacity < 0.98))[:, None].float()
+    gain = (behind * border).sum(dim=(2, 3)) / (warped * border).sum(dim=(2, 3)).clamp(min=1.0)
+    return warped * gain.clamp(1 / LARGEST_GAIN, LARGEST_GAIN)[:, :, None, None]
+
+
+def ping_pong(first: int, stop: int, count: int) -> NDArray[np.int64]:
+    """[count] pictures first … stop - 1 forwards and backwards, as long as needed: a background without a jump."""
+    there = np.arange(first, stop)
+    loop = np.concatenate([there, there[-2:0:-1]]) if len(there) > 2 else there
+    return loop[np.arange(count) % len(loop)].astype(np.int64)
+
+
+def _smooth(opacity: Tensor) -> Tensor:
+    return opacity * opacity * (3 - 2 * opacity)
+
+
+def _over(behind: Tensor, drawn: Tensor, opacity: Tensor) -> Tensor:
+    return behind + opacity[:, None] * (drawn - behind)
