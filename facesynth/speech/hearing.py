@@ -81,7 +81,7 @@ def _phones(
         return found.phones, found.words, found.warnings, "transcript"
     from facesynth.speech.recognition import recognise
 
-    warning = "nobody gave the words: phones were recognised by ear, a third or more of them wrongly; a transcript helps"
+    warning = "nobody gave the words: phones were recognised by ear, up to half of them wrongly; a transcript helps"
     return recognise(audio, rate), (), (warning,), "recognition"
 
 

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,7 @@ from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, loudest_db
 from facesynth.speech.phones import SILENCE
 from facesynth.speech.pronunciation import pronunciations
-from facesynth.speech.recognition import recognise
+from facesynth.speech.recognition import _pieces, recognise
 from facesynth.speech.transcript import words_of
 
 FOX = "The quick brown fox jumps over the lazy dog."
@@ -98,9 +100,24 @@ def test_recognition_hears_most_of_a_clear_voice(say):
     assert heard.duration_s == len(audio) / rate
     shared = sum(min(heard.labels.count(phone), phones_of(align(audio, rate, FOX)).count(phone)) for phone in set(heard.labels))
     assert shared >= 18
-    again = recognise(audio, rate)
-    assert again.labels == heard.labels
-    assert again.ends_s.tobytes() == heard.ends_s.tobytes()
+
+
+def test_recognition_repeats_itself(say):
+    audio, rate = say("Hello, Tom.")
+    once, twice = recognise(audio, rate), recognise(audio, rate)
+    assert once.labels == twice.labels
+    assert once.ends_s.tobytes() == twice.ends_s.tobytes()
+
+
+def test_long_sounds_are_recognised_in_pieces(say):
+    audio, rate = say("Hello, Tom.")
+    pieces = _pieces(np.tile(audio, 60), rate)
+    assert pieces[0][0] == 0
+    assert pieces[-1][1] == 60 * len(audio)
+    assert all(before[1] == after[0] for before, after in pairwise(pieces))
+    assert max(stop - start for start, stop in pieces) <= 17 * rate
+    cuts = [np.tile(audio, 60)[stop - rate // 30 : stop + rate // 30] for _, stop in pieces[:-1]]
+    assert max(loudest_db(cut, rate) for cut in cuts) < loudest_db(audio, rate) - 30
 
 
 def test_recognition_refuses_silence():

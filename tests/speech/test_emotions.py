@@ -31,7 +31,7 @@ def test_round_trip(tmp_path):
 def test_three_ways_of_saying_it(tmp_path, text):
     got = read(tmp_path, text)
     assert got.ends_s[-1] == 3.0
-    assert got.per_phone_at(0.5) if hasattr(got, "per_phone_at") else got.labels[got.index_at(0.5)] == "neutral"
+    assert got.labels[got.index_at(0.5)] == "neutral"
     assert got.labels[got.index_at(1.5)] == "happy"
     assert got.intensities[got.index_at(1.5)] == 0.4
     assert got.labels[got.index_at(2.9)] == "happy"
