@@ -38,7 +38,7 @@ def in_emotion(corpus, emotion):
 def sentences(shift, count=4, seed=0):
     rng = np.random.default_rng(seed)
     x = [rng.normal(size=(80, 2)) for _ in range(count)]
-    return [Samples(a, a + shift(a) + 0.3 * rng.normal(size=a.shape), f"s{k}") for k, a in enumerate(x)]
+    return [Samples(a, a + shift(a) + 0.3 * rng.normal(size=a.shape), np.zeros(2), np.zeros(6), f"s{k}") for k, a in enumerate(x)]
 
 
 def test_parallel_sentences_and_retakes_are_found(takes):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -10,6 +11,21 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.motion.rbf import Kernel, RbfMap
+
+
+@dataclass(frozen=True, eq=False)
+class FittedMap:
+    """What was learned from the sentences that two emotions share."""
+
+    source: int
+    """Index of the emotion that it leads from."""
+    target: int
+    rbf: RbfMap
+    """Displacement of the emotional components."""
+    shifts: NDArray[np.float64]
+    """[D] lasting shift of the other components."""
+    dropped: NDArray[np.float64]
+    """[C] lasting shift of what the components do not hold."""
 
 
 class EmotionMaps(nn.Module):
@@ -28,12 +44,19 @@ class EmotionMaps(nn.Module):
     gaussian: Tensor
     """[M] whether phi(z) is exp(-z²) or exp(-z)."""
 
+    shifts: Tensor
+    """[M, D] what a map adds to every frame: the lasting shift of the other components, 0 for the emotional ones."""
+
+    dropped: Tensor
+    """[M, C] what it adds to every frame outside the components."""
+
     def __init__(self) -> None:
         super().__init__()
-        self.fill({}, np.zeros(0, np.int64))
+        self.fill([], np.zeros(0, np.int64))
 
-    def fill(self, maps: dict[tuple[int, int], RbfMap], emotional: NDArray[np.int64]) -> None:
-        """Take fitted maps by (from, to)."""
+    def fill(self, fitted: Sequence[FittedMap], emotional: NDArray[np.int64]) -> None:
+        """Take fitted maps."""
+        maps = {(m.source, m.target): m.rbf for m in fitted}
         most = max((len(m.centres) for m in maps.values()), default=0)
         width = len(emotional)
         centres, coefficients = torch.zeros(2, len(maps), most, width, dtype=torch.float64)
@@ -42,6 +65,9 @@ class EmotionMaps(nn.Module):
             coefficients[number, : len(rbf.centres)] = rbf.coefficients
         self.register_buffer("pairs", torch.tensor(list(maps), dtype=torch.int64).reshape(-1, 2))
         self.register_buffer("emotional", torch.from_numpy(emotional))
+        for name in ("shifts", "dropped"):
+            rows = [getattr(m, name) for m in fitted]
+            self.register_buffer(name, torch.from_numpy(np.stack(rows) if rows else np.zeros((0, 0))))
         self.register_buffer("centres", centres.clone())
         self.register_buffer("coefficients", coefficients.clone())
         self.register_buffer("widths", torch.tensor([float(m.width) for m in maps.values()], dtype=torch.float64))
@@ -63,10 +89,9 @@ class EmotionMaps(nn.Module):
 
     def forward(self, components: Tensor, number: int, intensity: Tensor | float = 1.0) -> Tensor:
         """Components [..., D] in the map's first emotion to [..., D] in its second; intensity [...] 0 leaves them."""
-        moved = components.clone()
-        displacement = self.rbf(number)(components[..., self.emotional])
-        moved[..., self.emotional] += torch.as_tensor(intensity, dtype=components.dtype)[..., None] * displacement
-        return moved
+        change = self.shifts[number].expand(components.shape).clone()
+        change[..., self.emotional] = self.rbf(number)(components[..., self.emotional])
+        return components + torch.as_tensor(intensity, dtype=components.dtype)[..., None] * change
 
     def apply_array(
         self, components: NDArray[np.float64], number: int, intensity: NDArray[np.float64] | float = 1.0

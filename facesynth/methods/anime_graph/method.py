@@ -21,8 +21,17 @@ from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
 from facesynth.methods.anime_graph.lowpass import cutoffs_hz, low_pass
-from facesynth.methods.anime_graph.mapping import MapSettings, Width, fit_map, matched, require_pairs
-from facesynth.methods.anime_graph.maps import EmotionMaps
+from facesynth.methods.anime_graph.mapping import (
+    MapSettings,
+    Samples,
+    Width,
+    dropped_shift,
+    fit_map,
+    lasting_shift,
+    matched,
+    require_pairs,
+)
+from facesynth.methods.anime_graph.maps import EmotionMaps, FittedMap
 from facesynth.methods.anime_graph.parallel import Take, emotion_pairs, take_of
 from facesynth.methods.anime_graph.plan import Plan, Wish, blend, explain, make_plan
 from facesynth.methods.anime_graph.search import Weights
@@ -123,20 +132,24 @@ class AnimeGraph(Method):
 
     def _fit_maps(self, takes: Sequence[Take], seed: int) -> None:
         """A map for every ordered pair of emotions; why there is none is kept for those who ask for it."""
-        self.facts["no_map"], maps = {}, {}
+        self.facts["no_map"], fitted = {}, []
         pairs = list(permutations(self.emotions, 2))
         counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
         self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
-        for source, target in track(pairs, "emotion maps"):
+        for pair in track(pairs, "emotion maps"):
             try:
-                require_pairs(self.split, counts[source, target], source, target)
+                require_pairs(self.split, counts[pair], *pair)
             except FacesynthError as error:
-                self.facts["no_map"][f"{source} {target}"] = str(error)
-                continue
-            samples = matched(takes, self.split, source, target)
-            numbers = (self.emotions.index(source), self.emotions.index(target))
-            maps[numbers] = fit_map(samples, self.map_settings, seed=seed)
-        self.maps.fill(maps, self.split.emotional)
+                self.facts["no_map"][" ".join(pair)] = str(error)
+            else:
+                fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
+        self.maps.fill(fitted, self.split.emotional)
+
+    def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:
+        source, target = map(self.emotions.index, pair)
+        rbf = fit_map(samples, self.map_settings, seed=seed)
+        shift = lasting_shift(samples, self.split.emotional)
+        return FittedMap(source, target, rbf, shift, dropped_shift(samples, self.components.mixing.numpy()))
 
     def _split(self, takes: Sequence[Take], seed: int) -> Split:
         override = self.config["emotional_components"]
@@ -156,8 +169,9 @@ class AnimeGraph(Method):
             return motion
         frames = motion.frames.astype(np.float64)
         before = self.components.encode_array(np.nan_to_num(frames))
-        change = self.maps.apply_array(before, number, intensity) - before
-        changed = frames + change @ self.components.mixing.numpy().T
+        change = (self.maps.apply_array(before, number) - before) @ self.components.mixing.numpy().T
+        amount = np.broadcast_to(np.asarray(intensity, np.float64), len(frames))[:, None]
+        changed = frames + amount * (change + self.maps.dropped[number].numpy())
         return replace(motion, frames=keep_shut(changed, frames, motion.layout).astype(np.float32))
 
     def _map_number(self, source: str, target: str) -> int | None:

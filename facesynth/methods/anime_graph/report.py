@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from facesynth.errors import FacesynthError
 from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.components import FaceComponents
-from facesynth.methods.anime_graph.mapping import WIDTHS, MapSettings, Samples, fit_map, matched, require_pairs
+from facesynth.methods.anime_graph.mapping import (
+    WIDTHS,
+    MapSettings,
+    Samples,
+    dropped_shift,
+    fit_map,
+    lasting_shift,
+    matched,
+    require_pairs,
+)
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split
 from facesynth.motion.layout import Layout
@@ -61,10 +70,11 @@ class MapTrial:
             left_out = set(sentences[fold::folds])
             known = [s for s in samples if s.sentence not in left_out]
             maps = {f"{s.kernel} {s.width}": fit_map(known, s, seed=seed) for s in settings}
+            shifts = self._shifts(known)
             mean = self._mean_difference([p for p in pairs if p[0].sentence not in left_out])
             for pair in pairs:
                 if pair[0].sentence in left_out:
-                    for name, error in self._errors(pair, maps, mean).items():
+                    for name, error in self._errors(pair, maps, shifts, mean).items():
                         errors.setdefault(name, []).append(error)
         means = {name: float(np.mean(values)) for name, values in errors.items()}
         unchanged, mean_difference = means.pop("unchanged"), means.pop("mean difference")
@@ -82,8 +92,9 @@ class MapTrial:
             learned = set(sentences[:count])
             # One sentence cannot be left out of itself: its map takes the median width.
             fitting = settings if count > 1 else replace(settings, width="median")
-            rbf = fit_map([s for s in samples if s.sentence in learned], fitting, seed=seed)
-            errors = [self._errors(p, {"map": rbf}, np.zeros(1))["map"] for p in pairs if p[0].sentence in asked]
+            known = [s for s in samples if s.sentence in learned]
+            rbf, shifts = fit_map(known, fitting, seed=seed), self._shifts(known)
+            errors = [self._errors(p, {"map": rbf}, shifts, np.zeros(1))["map"] for p in pairs if p[0].sentence in asked]
             curve[count] = float(np.mean(errors))
         return curve
 
@@ -96,20 +107,25 @@ class MapTrial:
         differences = [b.frames[aligned(a, b, self.split.speech)] - a.frames for a, b in pairs]
         return np.concatenate(differences).mean(axis=0, dtype=np.float64)
 
-    def _errors(self, pair: tuple[Take, Take], maps: dict[str, RbfMap], mean: Floats) -> dict[str, float]:
+    def _errors(
+        self, pair: tuple[Take, Take], maps: dict[str, RbfMap], shifts: tuple[Floats, Floats], mean: Floats
+    ) -> dict[str, float]:
         a, b = pair
         truth = b.frames[aligned(a, b, self.split.speech)]
-        guesses = {name: self.mapped(a, rbf) for name, rbf in maps.items()}
+        guesses = {name: self.mapped(a, rbf, *shifts) for name, rbf in maps.items()}
         guesses |= {"unchanged": a.frames.astype(np.float64), "mean difference": a.frames + mean}
         return {name: unit_cube_rms(guess, truth, self.layout) for name, guess in guesses.items()}
 
-    def mapped(self, take: Take, rbf: RbfMap) -> Floats:
+    def _shifts(self, known: Sequence[Samples]) -> tuple[Floats, Floats]:
+        return lasting_shift(known, self.split.emotional), dropped_shift(known, self.components.mixing.numpy())
+
+    def mapped(self, take: Take, rbf: RbfMap, shift: Floats, dropped: Floats) -> Floats:
         """[T, C] a recording, mapped."""
         import torch
 
-        change = np.zeros_like(take.components)
+        change = np.tile(shift, (len(take.components), 1))
         change[:, self.split.emotional] = rbf(torch.from_numpy(take.components[:, self.split.emotional])).numpy()
-        moved = take.frames + change @ self.components.mixing.numpy().T
+        moved = take.frames + change @ self.components.mixing.numpy().T + dropped
         return keep_shut(moved, take.frames.astype(np.float64), self.layout)
 
 
