@@ -45,6 +45,9 @@ class LDS(Method):
         Block rows k: frames of past and of future that are compared. Lowered where the recording is short.
     deterministic_order, stochastic_order : int or "auto"
         States of the two parts; chosen by the error on clips left out.
+    own_means : bool
+        Whether each clip's own mean is taken out of sound and shape before the dynamics are learned: how the head was held
+        that time, or which mood it was, is not in the sound, and would be taken for slow states. The paper has one clip.
     """
 
     features: Standardised
@@ -62,6 +65,7 @@ class LDS(Method):
         rows: int = 8,
         deterministic_order: int | Auto = "auto",
         stochastic_order: int | Auto = "auto",
+        own_means: bool = True,
     ) -> None:
         super().__init__(
             scale=scale,
@@ -71,6 +75,7 @@ class LDS(Method):
             rows=rows,
             deterministic_order=deterministic_order,
             stochastic_order=stochastic_order,
+            own_means=own_means,
         )
         _check(self.config)
         self.features, self.shape = Standardised.empty(), Standardised.empty()
@@ -137,10 +142,11 @@ class LDS(Method):
     def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
         sounds = periodograms(pieces, Periodogram(self.fps, self.config["scale"], lead_ms))
         self.features = Standardised.fit(sounds, self.config["features"], "the sound")
-        return [
+        clips = [
             Clip(_encoded(self.features, sound), _encoded(self.shape, piece.frames))
             for sound, piece in zip(sounds, pieces, strict=True)
         ]
+        return [clip.centred() for clip in clips] if self.config["own_means"] else clips
 
     def _keep(self, system: LinearSystem, clips: list[Clip], rows: int, seed: int) -> None:
         rest = system.stochastic_output(tuple(clips))

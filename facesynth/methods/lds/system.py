@@ -30,6 +30,10 @@ class Clip:
     y: Array
     """[T, p] shape."""
 
+    def centred(self) -> Clip:
+        """The same with zero means."""
+        return Clip(self.u - self.u.mean(axis=0), self.y - self.y.mean(axis=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Deterministic:
