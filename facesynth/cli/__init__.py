@@ -16,6 +16,7 @@ VERBS = {
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
     "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
+    "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
     "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),
 }
 

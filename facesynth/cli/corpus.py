@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -12,8 +13,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from facesynth.corpus import Corpus
     from facesynth.motion.layout import Layout
 
+EMOTIONS = ("neutral", "happy", "angry", "sad")
+"""Those of a corpus for which nobody says them."""
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -31,9 +35,7 @@ def corpus_group() -> None:
     "--layout", "layout_file", type=FILE, required=True, help="YAML or JSON that names the channels, or another corpus.yaml."
 )
 @click.option("--fps", type=float, required=True, help="Rate at which the motion is kept; files of another rate are resampled.")
-@click.option(
-    "--emotions", default="neutral,happy,angry,sad", show_default=True, help="The emotions that the corpus tells apart."
-)
+@click.option("--emotions", default=",".join(EMOTIONS), show_default=True, help="The emotions that the corpus tells apart.")
 @click.option("--licence", default="", help="Of every recording that states none of its own; carried into every model.")
 @click.option("--consent", default="", help="Who agreed to what, in words; carried into every model.")
 @click.option("--notes", default="", help="Remarks.")
@@ -62,7 +64,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.argument("folder", type=FOLDER)
 @click.argument("files", nargs=-1, required=True, type=FILE)
 @click.option("--text", help="What is said, for one recording.")
-@click.option("--text-file", type=FILE, help="The same, from a file.")
+@click.option("--text-file", type=FILE, help="The same, from a file; or for many, CSV with the columns id and text.")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
 @click.option("--emotion", default="neutral", show_default=True, help="Emotion of every recording added.")
 @click.option("--emotions", type=FILE, help="Emotion that moves over time, for one recording: CSV, or lines of `end emotion`.")
@@ -73,6 +75,9 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--licence", default="", help="Of these recordings; the corpus' own otherwise.")
 @click.option("--consent", default="", help="Who agreed to what; the corpus' own otherwise.")
 @click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
+@click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
+@click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
+@click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes at once; all cores otherwise.")
 @as_json
 def add(
     *,
@@ -84,27 +89,43 @@ def add(
     emotions: Path | None,
     utterance_id: str | None,
     list_file: Path | None,
+    face: int | None,
+    performer: str | None,
+    jobs: int,
     as_json: bool,
     **about: Any,
 ) -> None:
     """Add recordings to the corpus in FOLDER.
 
-    FILES are files or folders. A recording is a sound (or a video with sound) and a motion file (.npz, .csv) of the
-    same name; beside them may lie NAME.TextGrid (or .lab), NAME.txt and NAME.emotions.csv. Without phones and text,
+    FILES are files or folders. A recording is a video, whose face is captured; or a sound (or a video with sound) and a
+    motion file (.npz, .csv) of the same name. Beside them may lie NAME.TextGrid (or .lab), NAME.txt and
+    NAME.emotions.csv. A FOLDER that is no corpus becomes one that fits the videos. Without phones and text,
     the phones are recognised from the sound. A run that was interrupted can be repeated.
     """
     from facesynth.corpus import Corpus
     from facesynth.corpus.add import add as add_recordings
     from facesynth.corpus.record import read_records
+    from facesynth.corpus.transcripts import read_transcripts
 
-    known = {**about, "text": text or (_read_text(text_file) if text_file else None), "id": utterance_id}
+    is_table = text_file is not None and text_file.suffix.lower() == ".csv"
+    known = {**about, "text": text or (_read_text(text_file) if text_file and not is_table else None), "id": utterance_id}
+    listed, texts = (
+        read_records(list_file) if list_file else None,
+        read_transcripts(text_file) if is_table and text_file else None,
+    )
+    corpus = (
+        Corpus.open(folder) if (folder / "corpus.yaml").exists() else _from_video(folder, files, performer, face, jobs, about)
+    )
     report = add_recordings(
-        Corpus.open(folder),
+        corpus,
         files,
         {name: value for name, value in known.items() if value is not None},
-        listed=read_records(list_file) if list_file else None,
+        listed=listed,
+        texts=texts,
         phones=phones,
         emotions=emotions,
+        face=face,
+        jobs=jobs,
     )
     lines = [f"added {len(report.added)}, already there {len(report.unchanged)}, not usable {len(report.refused)}"]
     _show(as_json, asdict(report), [*lines, *_listing("not added", report.refused), *_remarks(report.remarks)])
@@ -153,6 +174,21 @@ def stats(folder: Path, as_json: bool) -> None:
 
     counted = count(Corpus.open(folder))
     _show(as_json, counted.to_dict(), [counted.text()])
+
+
+def _from_video(
+    folder: Path, files: tuple[Path, ...], performer: str | None, face: int | None, jobs: int, about: Mapping[str, Any]
+) -> Corpus:
+    """A new corpus for the performer of videos."""
+    from facesynth.corpus.importers.video import corpus_from_video
+
+    header = {
+        "performer": performer or folder.resolve().name,
+        "emotions": list(dict.fromkeys([*EMOTIONS, about["emotion"]])),
+        "licence": about["licence"],
+        "consent": about["consent"],
+    }
+    return corpus_from_video(folder, files, header, face=face, jobs=jobs)
 
 
 def _read_layout(path: Path) -> Layout:

@@ -1,4 +1,4 @@
-"""Adding recordings to a corpus: a sound and a motion file each, with whatever lies beside them."""
+"""Adding recordings to a corpus: a video each, or a sound and a motion file, with whatever lies beside them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.motion_files import load_motion
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_signals
+from facesynth.corpus.workers import spread
 from facesynth.errors import FacesynthError
-from facesynth.progress import track
+from facesynth.motion.motion import Motion
 from facesynth.speech.audio import load_audio
+from facesynth.speech.segments import Segment
+from facesynth.speech.speech import Speech
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
 VIDEO = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg"})
@@ -30,6 +33,9 @@ KINDS = {
 }
 SINGLE = ("sound", "motion")
 
+Task = tuple[Corpus, Record, "Recording", int | None]
+"""Arguments of `prepare`."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -39,9 +45,23 @@ class Recording:
     """The name that they share, without suffix."""
     sound: Path
     motion: Path
+    """A motion file, or the video of which the face is captured."""
     phones: Path | None = None
     text: Path | None = None
     emotions: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A recording ready to be written into a corpus."""
+
+    record: Record
+    speech: Speech
+    motion: Motion
+    words: tuple[Segment, ...]
+    aligned: bool
+    """Whether a program placed the phones."""
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -64,41 +84,47 @@ def add(
     about: Mapping[str, Any] | None = None,
     *,
     listed: Mapping[str, Record] | None = None,
+    texts: Mapping[str, str] | None = None,
     phones: Path | None = None,
     emotions: Path | None = None,
+    face: int | None = None,
+    jobs: int = 1,
 ) -> AddReport:
     """Add every recording in files and folders; those that cannot be used are named with the reason, the others added.
 
     about: fields of `Record` that hold for every recording; listed: records that hold instead for the recordings of
-    these names. phones, emotions: files of the one recording that is added. Recordings that are there already are
-    passed over, so an interrupted run can be repeated.
+    these names; texts: what is said, by name. phones, emotions: files of the one recording that is added. face: which
+    one is captured from video with several, counted from the left. jobs: how many processes work at once; the corpus is
+    the same with any number. Recordings that are there already are passed over, so an interrupted run can be repeated.
     """
     recordings, refused = find_recordings(paths)
     about = about or {}
     if len(recordings) > 1 and ("id" in about or about.get("text") or phones or emotions):
         raise FacesynthError(f"id, text, phones and emotions fit one recording, but there are {len(recordings)}; use a list")
-    added: list[str] = []
-    unchanged: list[str] = []
-    remarks: dict[str, tuple[str, ...]] = {}
-    for found in track(recordings, "adding"):
-        recording = replace(found, phones=phones or found.phones, emotions=emotions or found.emotions)
+    recordings = [replace(found, phones=phones or found.phones, emotions=emotions or found.emotions) for found in recordings]
+    tasks = []
+    for recording in recordings:
         try:
-            record = _with_text((listed or {}).get(found.name) or Record(**{"id": found.name, **about}), found.text)
-            is_new, said = add_recording(corpus, record, recording)
+            record = (listed or {}).get(recording.name) or Record(**{"id": recording.name, **about})
+            record = replace(record, text=record.text or (texts or {}).get(recording.name, ""))
+            tasks.append((recording.name, (corpus, _with_text(record, recording.text), recording, face)))
         except FacesynthError as error:
-            refused[found.name] = str(error)
-            continue
-        (added if is_new else unchanged).append(record.id)
-        remarks.update({record.id: said} if said else {})
-    return AddReport(tuple(added), tuple(unchanged), refused, remarks)
+            refused[recording.name] = str(error)
+    return _kept(corpus, tasks, refused, jobs)
 
 
-def add_recording(corpus: Corpus, record: Record, recording: Recording) -> tuple[bool, tuple[str, ...]]:
+def add_recording(corpus: Corpus, record: Record, recording: Recording, face: int | None = None) -> tuple[bool, tuple[str, ...]]:
     """Add one recording; returns whether it is new, and what was noticed or done to it."""
-    motion, remarks = load_motion(recording.motion, corpus.layout, corpus.fps)
+    prepared = prepare(corpus, record, recording, face)
+    return (False, ()) if prepared is None else (True, _keep(corpus, prepared))
+
+
+def prepare(corpus: Corpus, record: Record, recording: Recording, face: int | None = None) -> Prepared | None:
+    """Read, capture and align one recording, writing nothing; None where the corpus has it already."""
+    motion, remarks = _motion(corpus, recording, face)
     source_hash = hash_signals(*load_audio(recording.sound), motion)
     if record.id in corpus and corpus.record(record.id).source_hash == source_hash:
-        return False, ()
+        return None
     if record.emotion not in corpus.emotions and recording.emotions is None:
         raise FacesynthError(f"emotion {record.emotion!r} is none of the corpus' {', '.join(corpus.emotions)}")
     from facesynth.speech.hearing import hear
@@ -112,15 +138,55 @@ def add_recording(corpus: Corpus, record: Record, recording: Recording) -> tuple
         intensity=record.intensity,
     )
     record = replace(record, text=record.text or heard.speech.text)
-    corpus.add_utterance(record, heard.speech, motion, heard.words, aligned=heard.source in ("transcript", "recognition"))
-    return True, (*remarks, *heard.warnings)
+    aligned = heard.source in ("transcript", "recognition")
+    return Prepared(record, heard.speech, motion, heard.words, aligned, (*remarks, *heard.warnings))
+
+
+def _motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Motion, tuple[str, ...]]:
+    if recording.motion.suffix.lower() not in VIDEO:
+        return load_motion(recording.motion, corpus.layout, corpus.fps)
+    from facesynth.corpus.importers.video import motion_from_video
+
+    return motion_from_video(recording.motion, recording.sound, corpus.layout, corpus.fps, face)
+
+
+def _kept(corpus: Corpus, tasks: list[tuple[str, Task]], refused: dict[str, str], jobs: int) -> AddReport:
+    """Prepare recordings in several processes; write them one after the other, in order, in this one."""
+    added: list[str] = []
+    unchanged: list[str] = []
+    remarks: dict[str, tuple[str, ...]] = {}
+    results = spread(_attempt, [task for _, task in tasks], jobs, "adding")
+    for (name, (_, record, _, _)), result in zip(tasks, results, strict=True):
+        try:
+            if isinstance(result, FacesynthError):
+                raise result
+            said = () if result is None else _keep(corpus, result)
+        except FacesynthError as error:
+            refused[name] = str(error)
+            continue
+        (unchanged if result is None else added).append(record.id)
+        remarks.update({record.id: said} if said else {})
+    return AddReport(tuple(added), tuple(unchanged), refused, remarks)
+
+
+def _attempt(task: Task) -> Prepared | FacesynthError | None:
+    try:
+        return prepare(*task)
+    except FacesynthError as error:
+        return error
+
+
+def _keep(corpus: Corpus, prepared: Prepared) -> tuple[str, ...]:
+    corpus.add_utterance(prepared.record, prepared.speech, prepared.motion, prepared.words, aligned=prepared.aligned)
+    return prepared.remarks
 
 
 def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:
     """Recordings among files and in folders, by name, and why others are none.
 
     Files of one recording share their name: `a.wav`, `a.npz` (or `a.csv`) and, if there are any, `a.TextGrid` (or `a.lab`),
-    `a.txt` (its words) and `a.emotions.csv`. One sound and one motion file alone belong together whatever they are called.
+    `a.txt` (its words) and `a.emotions.csv`. A video without a motion file is both, or the motion where a sound that was
+    recorded separately lies beside it. One sound and one motion file alone belong together whatever they are called.
     """
     files = [file for path in paths for file in _listed(Path(path))]
     groups: dict[str, dict[str, list[Path]]] = {}
@@ -133,12 +199,13 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
             groups.setdefault(name, {}).setdefault(kind, []).append(file)
     groups = _married(groups)
     recordings = []
-    for name, group in sorted(groups.items()):
+    for name, found in sorted(groups.items()):
+        group = _with_video(found)
         fault = _fault(group)
         if fault:
             refused[name] = fault
         else:
-            recordings.append(Recording(name, **{kind: found[0] for kind, found in group.items()}))
+            recordings.append(Recording(name, **{kind: files[0] for kind, files in group.items()}))
     return recordings, refused
 
 
@@ -170,6 +237,15 @@ def _married(groups: dict[str, dict[str, list[Path]]]) -> dict[str, dict[str, li
         for kind, files in group.items():
             one.setdefault(kind, []).extend(files)
     return {sounds[0]: one}
+
+
+def _with_video(group: dict[str, list[Path]]) -> dict[str, list[Path]]:
+    """A video shows the motion where no motion file does."""
+    videos = [file for file in group.get("sound", ()) if file.suffix.lower() in VIDEO]
+    if "motion" in group or len(videos) != 1:
+        return group
+    sounds = [file for file in group["sound"] if file not in videos]
+    return {**group, "sound": sounds or videos, "motion": videos}
 
 
 def _fault(group: Mapping[str, list[Path]]) -> str:

@@ -1,0 +1,1 @@
+"""Markerless capture: from ordinary video to the motion of a face."""

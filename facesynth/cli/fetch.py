@@ -1,0 +1,26 @@
+"""`facesynth fetch`: what is too large or too foreign to come with the package, downloaded when asked."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.group("fetch")
+def fetch() -> None:
+    """Download what facesynth needs beyond itself, once, into the user's cache."""
+
+
+@fetch.command("landmarks")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def landmarks(as_json: bool) -> None:
+    """The networks that find a face and 468 points on it, for `facesynth corpus add` from video.
+
+    Downloads the wheel of MediaPipe 0.10.21 (35 MB, Apache-2.0) with pip, checks the hashes of three models in it and
+    converts them.
+    """
+    from facesynth.capture.models import WHEEL, fetch_landmarks
+
+    folder = fetch_landmarks()
+    click.echo(json.dumps({"folder": str(folder), "from": WHEEL}) if as_json else f"the models of {WHEEL} are in {folder}")

@@ -1,0 +1,1 @@
+"""Recordings as other systems keep them, on their way into a corpus."""
