@@ -20,7 +20,7 @@ from facesynth.face.shading import EYE, HIDDEN, SKIN, TEETH, TONGUE, Surface
 from facesynth.face.strands import Skin, Strands, grow_all, hair_volume_mm
 from facesynth.face.subdivision import catmull_clark, refine_corners
 
-_VERSION = 1  # raise it whenever what is baked changes
+_VERSION = 2  # raise it whenever what is baked changes
 _MATERIALS = np.array([SKIN, EYE, EYE, TEETH, TEETH, TONGUE, HIDDEN, HIDDEN, HIDDEN, HIDDEN], np.uint8)
 _STRAND_FIELDS = ("lift_mm", "segments", "width_mm", "colour", "horizon", "raised_mm")
 _LIP_DEPTH_MM = 146.0  # z of the lips at rest: the mouth darkens behind it
@@ -100,11 +100,11 @@ def _cavity(
     skin_quads: NDArray[np.int32],
     inner: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """[N] how far light reaches: 1 outside the mouth, falling to almost nothing 35 mm behind the lips."""
+    """[N] how far light reaches: 1 outside the mouth, falling to almost nothing 25 mm behind the lips."""
     inside = np.zeros(len(rest))
     np.maximum.at(inside, skin_quads, inner)
     inside[fine[np.isin(material, (TEETH, TONGUE))]] = 1
-    reach = 0.05 + 0.95 * step(_LIP_DEPTH_MM - 34, _LIP_DEPTH_MM - 1, rest[:, 2].astype(np.float64))
+    reach = 0.05 + 0.95 * step(_LIP_DEPTH_MM - 26, _LIP_DEPTH_MM - 1, rest[:, 2].astype(np.float64))
     return (1 - inside * (1 - reach)).astype(np.float32)
 
 

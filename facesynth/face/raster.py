@@ -59,7 +59,7 @@ def project(points: NDArray[Any], axes: NDArray[Any], middle_px: NDArray[Any], f
     return screen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def draw_depth(screen: NDArray[Any], quads: NDArray[Any], depth: NDArray[Any]) -> None:
     """Keep in depth [H, W] the smallest z of quads over screen points [N, 3] (x, y in pixels, z), both sides drawn."""
     height, width = depth.shape
@@ -75,15 +75,15 @@ def draw_depth(screen: NDArray[Any], quads: NDArray[Any], depth: NDArray[Any]) -
             x0, x1 = max(0, int(np.ceil(min(ax, bx, cx) - 0.5))), min(width - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
             y0, y1 = max(0, int(np.ceil(min(ay, by, cy) - 0.5))), min(height - 1, int(np.floor(max(ay, by, cy) - 0.5)))
             inverse = np.float32(1.0) / area
+            wb_x, wb_y = (cy - ay) * inverse, -(cx - ax) * inverse
+            wc_x, wc_y = -(by - ay) * inverse, (bx - ax) * inverse
             for y in range(y0, y1 + 1):
-                py = np.float32(y + 0.5)
+                py = np.float32(y) + np.float32(0.5) - ay
                 for x in range(x0, x1 + 1):
-                    px = np.float32(x + 0.5)
-                    wb = ((px - ax) * (cy - ay) - (py - ay) * (cx - ax)) * inverse
-                    wc = ((bx - ax) * (py - ay) - (by - ay) * (px - ax)) * inverse
+                    px = np.float32(x) + np.float32(0.5) - ax
+                    wb, wc = px * wb_x + py * wb_y, px * wc_x + py * wc_y
                     if wb >= 0 and wc >= 0 and wb + wc <= 1:
-                        z = az + wb * (bz - az) + wc * (cz - az)
-                        depth[y, x] = min(depth[y, x], z)
+                        depth[y, x] = min(depth[y, x], az + wb * (bz - az) + wc * (cz - az))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -266,7 +266,7 @@ def draw_segment(
         for minor in range(max(0, int(np.floor(middle - reach))), min(TILE - 1, int(np.floor(middle + reach))) + 1):
             x, y = (minor, major) if steep else (major, minor)
             through = gathered[y, x, 3]
-            if through < np.float32(0.02):
+            if through < np.float32(0.04):
                 continue
             px, py = x + np.float32(0.5) - ax, y + np.float32(0.5) - ay
             along = (px * dx + py * dy) / length

@@ -17,10 +17,10 @@ from facesynth.face.markers import INNER_LIPS
 from facesynth.face.occlusion import orthographic
 from facesynth.face.raster import FAR, TILE, bin_segments, bin_triangles, draw_depth, nearest_first, project, vertex_normals
 from facesynth.face.rig import Rig
-from facesynth.face.shading import HIDDEN, KEY, Shot, soften_shadow
+from facesynth.face.shading import HIDDEN, KEY, Shot, with_bounds
 from facesynth.face.tiles import Bins, Hair, draw_tiles, light_hair
 
-_SHADOW_SIZE, _SHADOW_HALF_MM, _SHADOW_BLUR = 640, 190.0, 3
+_SHADOW_SIZE, _SHADOW_HALF_MM = 512, 190.0
 _SHADOW_CENTRE_MM = np.array([0.0, -30.0, 60.0])
 _STRAND_BUCKETS = 4096
 _CHUNKS_PER_THREAD = 8
@@ -30,9 +30,9 @@ _CHUNKS_PER_THREAD = 8
 class Camera:
     """A pinhole whose picture has the performer's left on its right."""
 
-    position_mm: tuple[float, float, float] = (0.0, -24.0, 1010.0)
-    target_mm: tuple[float, float, float] = (0.0, -29.0, 60.0)
-    field_of_view_deg: float = 17.4
+    position_mm: tuple[float, float, float] = (0.0, -22.0, 1010.0)
+    target_mm: tuple[float, float, float] = (0.0, -24.0, 60.0)
+    field_of_view_deg: float = 18.0
     """Vertical."""
 
     def focal_px(self, height_px: int) -> float:
@@ -55,7 +55,7 @@ class Camera:
 
 
 class Renderer:
-    """Draws posed vertices of the built-in head. One renderer must not be used by two threads at once."""
+    """Draws posed vertices of the built-in head; the first picture of a fresh installation waits for numba to compile."""
 
     def __init__(self, rig: Rig, size: tuple[int, int] = (1280, 720), camera: Camera | None = None) -> None:
         if len(size) != 2 or min(size) < 16 or max(size) > 8192:
@@ -68,7 +68,7 @@ class Renderer:
         self._light = orthographic(KEY, _SHADOW_CENTRE_MM, _SHADOW_HALF_MM, _SHADOW_SIZE)
         self._eyes = [(rig.vertices_of(f"{side}_eye"), rig.eye_centre_mm(side)) for side in ("left", "right")]
         self._lips = rig.from_source(np.array(INNER_LIPS[2:5]).T)
-        threads = os.cpu_count() or 1
+        threads = available_cores()
         tiles = np.random.default_rng(0).permutation(self._grid[0] * self._grid[1])  # so that every chunk is as much work
         self._chunks = np.array_split(tiles, threads * _CHUNKS_PER_THREAD)
         self._pool = ThreadPoolExecutor(threads, "render")
@@ -110,7 +110,7 @@ class Renderer:
         screen = outer @ self._light[:, :3].T + self._light[:, 3]
         depth = np.full((_SHADOW_SIZE, _SHADOW_SIZE), FAR, np.float32)
         draw_depth(screen, self._drawn, depth)
-        return soften_shadow(depth, _SHADOW_BLUR)
+        return with_bounds(depth)
 
     def _hair(self, position: NDArray[np.float32], normal: NDArray[np.float32]) -> tuple[Hair, tuple[NDArray, NDArray]]:
         strands = self._baked.strands
@@ -139,6 +139,11 @@ class Renderer:
             moved = now.mean(axis=0) + turn.apply(centre - rest.mean(axis=0))
             frames.append(np.vstack([turn.inv().as_matrix(), moved]))
         return np.array(frames, np.float32)
+
+
+def available_cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _backdrop(width: int, height: int) -> NDArray[np.float32]:

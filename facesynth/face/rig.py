@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,6 +68,11 @@ class Rig:
             raise FacesynthError(f"source vertices {wanted[self.source_index[found] != wanted].tolist()} are not on this head")
         return found
 
+    @cached_property
+    def _eyeballs(self) -> tuple[tuple[NDArray[np.int64], NDArray[np.float64]], ...]:
+        """Vertices and centre of the left and of the right eye."""
+        return tuple((self.vertices_of(f"{side}_eye"), self.eye_centre_mm(side)) for side in ("left", "right"))
+
     def eye_centre_mm(self, side: str) -> NDArray[np.float64]:
         """[3] centre of the eyeball, `left` or `right`; the cornea bulges beyond its sphere to the front."""
         ball = self.rest_mm[self.vertices_of(f"{side}_eye")].astype(np.float64)
@@ -106,9 +112,9 @@ def pose(
     values = _checked_weights(weights)[None]
     if gaze is not None:
         values = gaze_weights(values, np.asarray(gaze, np.float64)[None])
-    vertices = rig.rest_mm + np.tensordot(values[0].astype(np.float32), rig.shapes_mm, 1)
-    for side, turn in zip(("left", "right"), eye_rotations(values[0]), strict=True):
-        ball, centre = rig.vertices_of(f"{side}_eye"), rig.eye_centre_mm(side)
+    active = np.nonzero(values[0])[0]
+    vertices = rig.rest_mm + np.tensordot(values[0, active].astype(np.float32), rig.shapes_mm[active], 1)
+    for (ball, centre), turn in zip(rig._eyeballs, eye_rotations(values[0]), strict=True):
         vertices[ball] = turn.apply(rig.rest_mm[ball] - centre) + centre
     if tongue_up:
         _lift_tongue(rig, vertices, tongue_up)
@@ -161,7 +167,7 @@ def _follow_head(points: NDArray, head_weight: NDArray[np.float32], head: NDArra
     if head.shape != (len(points), 6):
         raise FacesynthError(f"head must have shape [{len(points)}, 6]: rotation vector and translation; got {head.shape}")
     turn = Rotation.from_rotvec(head[:, :3]).as_matrix()
-    moved = np.einsum("tij,tkj->tki", turn, points - PIVOT_MM) + PIVOT_MM + head[:, None, 3:]
+    moved = (points - PIVOT_MM) @ np.swapaxes(turn, 1, 2) + PIVOT_MM + head[:, None, 3:]
     return (points + head_weight[:, None] * (moved - points)).astype(points.dtype)
 
 

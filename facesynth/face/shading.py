@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from facesynth.face.raster import FAR, barycentric
+from facesynth.face.raster import barycentric
 
 SKIN, EYE, TEETH, TONGUE, HIDDEN = range(5)
 """Materials; HIDDEN surfaces (the lashes' cards) are not drawn."""
@@ -28,7 +28,9 @@ RIM_COLOUR = np.array([0.62, 0.70, 0.86])
 _SKY = np.array([0.215, 0.215, 0.23])
 _GROUND = np.array([0.13, 0.095, 0.078])
 _WRAP = np.array([0.24, 0.13, 0.10])  # light that travels through skin past the edge of shadow: red goes farthest
-SHADOW_HARDNESS = 0.2  # per mm: an occluder 1 / 0.2 = 5 mm in front of a surface dims it to 1 / e
+REACH = 2
+"""Texels of the shadow map that are looked at to each side of a point."""
+_RAMP_MM = 4.0  # an occluder that far in front shades fully
 
 
 class Surface(NamedTuple):
@@ -55,7 +57,7 @@ class Shot(NamedTuple):
     position: NDArray[np.float32]
     normal: NDArray[np.float32]
     shadow: NDArray[np.float32]
-    """[S, S] blurred exponential shadow map."""
+    """[S, S, 3] shadow map: depth, and the nearest and farthest depth around."""
     light: NDArray[np.float32]
     """[3, 4] world to shadow map: column, row, depth."""
     eyes: NDArray[np.float32]
@@ -75,55 +77,51 @@ def smoothstep(low: float, high: float, x: float) -> float:
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def lit_share(shadow: NDArray[Any], light: NDArray[Any], x: float, y: float, z: float) -> float:
-    """How much of the key light reaches a point, 0..1 (exponential shadow map, Annen et al. 2008, eq. 3).
+    """How much of the key light reaches a point, 0..1 (percentage-closer filtering, Reeves et al. 1987).
 
-    The blurred map holds the mean of exp(c d) over occluder depths d nearby; times exp(-c z) it is 1 where
-    nothing lies in front and falls with the occluders' distance; one bilinear look-up gives a soft edge.
+    Of the texels around, those count that hold nothing nearer to the light, with weights that slide with
+    the point, and with a ramp of 4 mm instead of a threshold. Far from any edge of a shadow the nearest and
+    the farthest depth around, kept beside each texel, answer at once.
     """
     column = light[0, 0] * x + light[0, 1] * y + light[0, 2] * z + light[0, 3] - 0.5
     row = light[1, 0] * x + light[1, 1] * y + light[1, 2] * z + light[1, 3] - 0.5
-    away = light[2, 0] * x + light[2, 1] * y + light[2, 2] * z + light[2, 3]
+    away = light[2, 0] * x + light[2, 1] * y + light[2, 2] * z + light[2, 3] - 0.5
     size = shadow.shape[0]
-    if column < 0 or row < 0 or column >= size - 1 or row >= size - 1:
+    if column < REACH or row < REACH or column >= size - 1 - REACH or row >= size - 1 - REACH:
         return 1.0
     c, r = int(column), int(row)
+    if away <= shadow[r, c, 1]:
+        return 1.0
+    if away >= shadow[r, c, 2] + _RAMP_MM:
+        return 0.0
     u, v = column - c, row - r
-    upper = shadow[r, c] * (1 - u) + shadow[r, c + 1] * u
-    lower = shadow[r + 1, c] * (1 - u) + shadow[r + 1, c + 1] * u
-    return smoothstep(0.02, 0.85, (upper * (1 - v) + lower * v) * np.exp(-SHADOW_HARDNESS * away))
+    total = 0.0
+    for i in range(-REACH, REACH + 2):
+        tall = (1 - v if i == -REACH else v if i == REACH + 1 else 1.0) / (2 * REACH + 1)
+        for k in range(-REACH, REACH + 2):
+            wide = (1 - u if k == -REACH else u if k == REACH + 1 else 1.0) / (2 * REACH + 1)
+            total += tall * wide * min(max(1.0 - (away - shadow[r + i, c + k, 0]) / _RAMP_MM, 0.0), 1.0)
+    return total
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def soften_shadow(depth: NDArray[Any], radius: int) -> NDArray[np.float32]:
-    """Depths [S, S] in mm (FAR where nothing is) to a box-blurred map of exp(SHADOW_HARDNESS * depth)."""
+def with_bounds(depth: NDArray[Any]) -> NDArray[np.float32]:
+    """[S, S, 3] depths [S, S] with the nearest and the farthest one that `lit_share` would look at from each texel."""
     size = depth.shape[0]
-    rows, result = np.empty((size, size), np.float32), np.empty((size, size), np.float32)
-    line = np.empty(size, np.float32)
-    share = np.float32(1.0 / (2 * radius + 1))
-    farthest = np.float32(np.exp(80.0))
+    low, high = depth.copy(), depth.copy()
+    result = np.empty((size, size, 3), np.float32)
     for r in range(size):
-        for c in range(size):
-            line[c] = farthest if depth[r, c] == FAR else np.exp(np.float32(min(SHADOW_HARDNESS * depth[r, c], 80.0)))
-        _box(line, radius, rows[r])
-    for r in range(size):
-        first, last = max(r - radius, 0), min(r + radius, size - 1)
-        for c in range(size):
-            result[r, c] = np.float32(0)
-        for k in range(first, last + 1):
+        for k in range(max(r - REACH, 0), min(r + REACH + 1, size - 1) + 1):
             for c in range(size):
-                result[r, c] += rows[k, c] * share
+                low[r, c] = min(low[r, c], depth[k, c])
+                high[r, c] = max(high[r, c], depth[k, c])
+    for r in range(size):
+        for c in range(size):
+            nearest, farthest = low[r, c], high[r, c]
+            for k in range(max(c - REACH, 0), min(c + REACH + 1, size - 1) + 1):
+                nearest, farthest = min(nearest, low[r, k]), max(farthest, high[r, k])
+            result[r, c, 0], result[r, c, 1], result[r, c, 2] = depth[r, c], nearest, farthest
     return result
-
-
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _box(line: NDArray[Any], radius: int, out: NDArray[Any]) -> None:
-    size = len(line)
-    share = np.float32(1.0 / (2 * radius + 1))
-    for c in range(size):
-        total = np.float32(0)
-        for k in range(max(c - radius, 0), min(c + radius, size - 1) + 1):
-            total += line[k] * share
-        out[c] = total
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -151,13 +149,18 @@ def _unit(x: float, y: float, z: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _lobe(n: tuple[float, float, float], v: tuple[float, float, float], light: NDArray[Any], doublings: int) -> float:
-    """Blinn and Phong's highlight with exponent 2 ** doublings, normalised so that narrow and wide ones carry as much light."""
+def _lobes(n: tuple[float, float, float], v: tuple[float, float, float], light: NDArray[Any], doublings: int) -> float:
+    """Blinn and Phong's highlights with exponents 2 ** doublings and a quarter of it.
+
+    Each is normalised, so that a narrow one carries as much light as a wide one.
+    """
     hx, hy, hz = _unit(light[0] + v[0], light[1] + v[1], light[2] + v[2])
     value = max(n[0] * hx + n[1] * hy + n[2] * hz, 0.0)
-    for _ in range(doublings):
+    for _ in range(doublings - 2):
         value *= value
-    return value * ((1 << doublings) + 8) / 25.0
+    narrow = value * value
+    narrow *= narrow
+    return (narrow * ((1 << doublings) + 8) + 0.55 * value * ((1 << (doublings - 2)) + 8)) / 25.0
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -170,8 +173,9 @@ def _reflect(
     soft: float,
     gloss: float,
     doublings: int,
+    rims: float,
 ) -> tuple[float, float, float]:
-    """Light that a surface sends along v; key and sky are visible shares, soft is 1 for flesh and 0 for hard matter.
+    """Light that a surface sends along v; key, sky and rims are visible shares, soft is 1 for flesh, 0 for hard matter.
 
     Under skin light travels a few millimetres, red farthest: each channel's cosine wraps around the edge of
     shadow by its own amount, and cast shadows and creases lose less red than blue.
@@ -181,14 +185,11 @@ def _reflect(
     rim = max(0.0, n[0] * RIM[0] + n[1] * RIM[1] + n[2] * RIM[2]) + 0.7 * max(
         0.0, n[0] * BACK[0] + n[1] * BACK[1] + n[2] * BACK[2]
     )
-    rim *= sky * sky
+    rim *= rims
     grazing = 1.0 - max(0.0, n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
     fresnel = gloss * (0.13 + 1.3 * grazing * grazing * grazing * grazing)
     lit = key * smoothstep(-0.05, 0.35, toward)
-    shine = fresnel * (
-        lit * (_lobe(n, v, KEY, doublings) + 0.55 * _lobe(n, v, KEY, doublings - 2))
-        + 0.12 * sky * _lobe(n, v, FILL, doublings - 1)
-    )
+    shine = fresnel * (lit * _lobes(n, v, KEY, doublings) + 0.10 * sky * _lobes(n, v, FILL, doublings - 1))
     upward = 0.5 + 0.5 * n[1]
     red = albedo[0] * _irradiance(0, toward, fill, rim, upward, key, sky, soft, albedo[0]) + KEY_COLOUR[0] * shine
     green = albedo[1] * _irradiance(1, toward, fill, rim, upward, key, sky, soft, albedo[1]) + KEY_COLOUR[1] * shine
@@ -236,7 +237,7 @@ def _eye(
     side = smoothstep(7.0, 13.0, abs(dx))
     shade = (1.0 - 0.62 * smoothstep(0.5, 5.5, dy)) * (1.0 - 0.35 * smoothstep(-3.0, -7.0, dy)) * (1.0 - 0.35 * side)
     white = (0.60, 0.555 - 0.10 * side, 0.52 - 0.11 * side)
-    red, green, blue = _reflect(white, (wx, wy, wz), v, (0.35 + 0.65 * key) * shade, shade, 0.6, 0.0, 5)
+    red, green, blue = _reflect(white, (wx, wy, wz), v, (0.35 + 0.65 * key) * shade, shade, 0.6, 0.0, 5, 0.3 * shade)
     if window > 0:
         ired, igreen, iblue = _iris((ex, ey, ez), (cx, cy, cz), (vx, vy, vz), eyes, which, key)
         red += (ired * shade - red) * window
@@ -324,8 +325,8 @@ def _teeth(
     ivory = 1.0 - 0.55 * between
     gum = smoothstep(-80.3, -82.3, rest[1]) if lower else smoothstep(-62.8, -60.8, rest[1])
     red, green, blue = 0.66 * ivory, 0.60 * ivory * (1.0 - 0.05 * between), 0.50 * ivory * (1.0 - 0.12 * between)
-    red, green, blue = red + (0.40 - red) * gum, green + (0.14 - green) * gum, blue + (0.13 - blue) * gum
-    return _reflect((red, green, blue), (nx, ny, nz), v, key, sky, 0.5, 0.28, 6)
+    red, green, blue = red + (0.30 - red) * gum, green + (0.10 - green) * gum, blue + (0.09 - blue) * gum
+    return _reflect((red, green, blue), (nx, ny, nz), v, key, sky, 0.5, 0.28, 6, 0.0)
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -373,10 +374,10 @@ def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArra
         elif material[quad] == SKIN:
             s, t = (wb + wc, wc) if half == 0 else (wb, wb + wc)
             red, green, blue, gloss = _texel(texture, quad, s, t)
-            colour = _reflect((red, green, blue), n, v, key * reach, sky * reach, 1.0, gloss * reach, 5)
+            colour = _reflect((red, green, blue), n, v, key * reach, sky * reach, 1.0, gloss * reach, 5, sky * sky * reach)
         elif material[quad] == TEETH:
             colour = _teeth(_weigh(rest, a, b, c, wb, wc), n, v, key * reach * mouth, 0.75 * sky * reach * mouth)
         else:
             reach *= mouth
-            colour = _reflect((0.40, 0.125, 0.115), n, v, key * reach, sky * reach, 1.0, 0.35 * reach, 6)
+            colour = _reflect((0.40, 0.125, 0.115), n, v, key * reach, sky * reach, 1.0, 0.35 * reach, 6, 0.0)
         colours[k, 0], colours[k, 1], colours[k, 2] = colour

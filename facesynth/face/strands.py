@@ -147,7 +147,8 @@ def _hair_length(root: Points) -> NDArray[np.float64]:
 def hair_volume_mm(root: Points) -> NDArray[np.float64]:
     """[S] how high hair stands over the skin, mm."""
     x, y, z = root.T
-    return 1.4 + 3.0 * step(0, 75, y) + 6.0 * step(60, 100, y) * step(-20, 90, z) * step(75, 20, np.abs(x + 8))
+    full = 1.4 + 3.0 * step(0, 75, y) + 7.0 * step(60, 100, y) * step(-20, 90, z) * step(75, 20, np.abs(x + 8))
+    return full * (0.65 + 0.7 * noise(root * 0.09 + 17))
 
 
 def _hair_flow(place: Points) -> Points:

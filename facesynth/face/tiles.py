@@ -127,7 +127,7 @@ def _collect(
     for y in range(TILE):
         for x in range(TILE):
             through = gathered[y, x, 3]
-            waiting = (1 << SAMPLES) - 1 if through > np.float32(0.02) else 0
+            waiting = (1 << SAMPLES) - 1 if through > np.float32(0.04) else 0
             for s in range(SAMPLES):
                 first = owner[y, x, s]
                 if first < 0 or not waiting & (1 << s):
