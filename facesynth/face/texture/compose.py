@@ -14,7 +14,7 @@ from torch import Tensor
 
 from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import Mesh, ringed_mesh
-from facesynth.face.texture.shapes import Similarities
+from facesynth.face.texture.shapes import HeadMaps
 from facesynth.face.texture.sources import coherent, nearest
 from facesynth.face.texture.speaker import Speaker
 from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
@@ -115,7 +115,7 @@ class TexturedFace:
 
     def _placed(self, shapes: NDArray[np.float64], pictures: NDArray[np.int64]) -> NDArray[np.float64]:
         """Vertices [T, V, 2] px of head-fixed shapes on the heads of these pictures."""
-        head = Similarities(self.speaker.linear[pictures], self.speaker.shift[pictures])
+        head = HeadMaps(self.speaker.linear[pictures], self.speaker.shift[pictures])
         return head.to_picture(self.mesh.vertices(shapes))
 
     def _window(self, vertices: NDArray[np.float64]) -> tuple[int, int, int, int]:

@@ -13,9 +13,9 @@ from facesynth.errors import FacesynthError
 
 UNSTEADY = 0.25
 """Of the median step between frames: steps that differ by more make the rate variable."""
-CUT_LEVEL = 20.0
+CUT_LEVEL = 8.0
 """Mean change of brightness (0..255) from one frame to the next above which …"""
-CUT_RATIO = 8.0
+CUT_RATIO = 5.0
 """… and this many times the median change, there is a cut."""
 
 

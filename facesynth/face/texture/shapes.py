@@ -13,14 +13,16 @@ from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
 ROBUST_ROUNDS = 5
+FEWEST_STILL = 6
+"""Points on the upper face that are enough to tell the head's motion."""
 
 
 @dataclass(frozen=True, eq=False)
-class Similarities:
+class HeadMaps:
     """For each frame the map p -> p @ linear + shift from head-fixed to picture coordinates (rows are points)."""
 
     linear: NDArray[np.float64]
-    """[T, 2, 2] scaled rotation."""
+    """[T, 2, 2]"""
     shift: NDArray[np.float64]
     """[T, 2] px."""
 
@@ -39,7 +41,7 @@ class Shapes:
 
     points: NDArray[np.float64]
     """[T, K, 2] px, y down, head-fixed: as if the head stood as in the reference picture."""
-    head: Similarities
+    head: HeadMaps
     """Where the head really was."""
     fps: float
 
@@ -61,20 +63,35 @@ def picture_points(frames: NDArray[np.float32]) -> NDArray[np.float64]:
 
 
 def shapes_of(tracks: Tracks, fps: float) -> list[Shapes]:
-    """The shapes of every clip."""
-    return [_shapes(tracks, clip, fps) for clip in tracks.clips]
+    """The shapes of every clip.
+
+    Frame by frame a similarity takes the head's motion out, told by the upper face where there are points on it. How the
+    head was held differs from clip to clip, and foreshortens the face: an affine map for each clip brings its mean
+    shape to that of all clips.
+    """
+    reference = tracks.reference.astype(np.float64)
+    wholes = [_filled(tracks, clip, fps) for clip in tracks.clips]
+    still = slice(tracks.lower, None) if len(reference) - tracks.lower >= FEWEST_STILL else slice(None)
+    heads = [_similarities(reference[still], whole[:, still]) for whole in wholes]
+    means = [head.to_head(whole).mean(axis=0) for head, whole in zip(heads, wholes, strict=True)]
+    held = [_held(head, np.mean(means, axis=0), mean) for head, mean in zip(heads, means, strict=True)]
+    return [Shapes(head.to_head(whole[:, : tracks.lower]), head, fps) for head, whole in zip(held, wholes, strict=True)]
 
 
-def _shapes(tracks: Tracks, clip: NDArray[np.float32], fps: float) -> Shapes:
-    flat = clip.reshape(len(clip), -1)
-    filled = fill_gaps(flat, fps, 2)[0].reshape(clip.shape)
+def _filled(tracks: Tracks, clip: NDArray[np.float32], fps: float) -> NDArray[np.float64]:
+    """Points [T, K + J, 2] of a clip without gaps: short ones filled in time, long ones from the neighbours."""
+    short = fill_gaps(clip.reshape(len(clip), -1), fps, 2)[0].reshape(clip.shape)
     reference = tracks.reference
-    whole = np.stack([reference + neighbours_mean(reference, frame - reference) for frame in filled]).astype(np.float64)
-    head = _similarities(reference.astype(np.float64), whole)
-    return Shapes(head.to_head(whole[:, : tracks.lower]), head, fps)
+    return np.stack([reference + neighbours_mean(reference, frame - reference) for frame in short]).astype(np.float64)
 
 
-def _similarities(reference: NDArray[np.float64], frames: NDArray[np.float64]) -> Similarities:
+def _held(head: HeadMaps, everywhere: NDArray[np.float64], here: NDArray[np.float64]) -> HeadMaps:
+    """Head maps of a clip after the affine map from the mean shape of all clips [P, 2] to the clip's own."""
+    affine = np.linalg.lstsq(np.column_stack([everywhere, np.ones(len(everywhere))]), here, rcond=None)[0]
+    return HeadMaps(affine[:2] @ head.linear, (affine[2] @ head.linear) + head.shift)
+
+
+def _similarities(reference: NDArray[np.float64], frames: NDArray[np.float64]) -> HeadMaps:
     """Least-squares similarity from reference [J, 2] to each frame [T, J, 2], points far off weighing less each round."""
     # As complex numbers, a similarity is z -> a z + b.
     z, w = reference @ [1, 1j], frames @ [1, 1j]
@@ -90,4 +107,4 @@ def _similarities(reference: NDArray[np.float64], frames: NDArray[np.float64]) -
         weight = 1 / np.maximum(distance, 0.3 + np.median(distance, axis=1, keepdims=True))
     real, imaginary = a[:, 0].real, a[:, 0].imag
     linear = np.stack([np.stack([real, imaginary], axis=-1), np.stack([-imaginary, real], axis=-1)], axis=-2)
-    return Similarities(linear, np.stack([b[:, 0].real, b[:, 0].imag], axis=-1))
+    return HeadMaps(linear, np.stack([b[:, 0].real, b[:, 0].imag], axis=-1))

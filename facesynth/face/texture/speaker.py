@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.errors import FacesynthError
-from facesynth.face.texture.shapes import Shapes, Similarities
+from facesynth.face.texture.shapes import HeadMaps, Shapes
 
 LOOK_PX = 16
 """Side of the little grey picture of the lower face by which pictures are compared."""
@@ -29,16 +29,16 @@ class Speaker:
     linear: NDArray[np.float64]
     """[N, 2, 2] and …"""
     shift: NDArray[np.float64]
-    """[N, 2] … the similarity from head-fixed to picture coordinates."""
+    """[N, 2] … the map from head-fixed to picture coordinates."""
     clip_starts: NDArray[np.bool_]
     """[N] whether a clip begins."""
     fps: float
     """Hz, of the pictures."""
 
     @property
-    def head(self) -> Similarities:
+    def head(self) -> HeadMaps:
         """Where the head was in each picture."""
-        return Similarities(self.linear, self.shift)
+        return HeadMaps(self.linear, self.shift)
 
     @property
     def looks(self) -> NDArray[np.float64]:
@@ -62,7 +62,7 @@ class Speaker:
         if not Path(path).is_file():
             raise FacesynthError(f"{path}: no such file; make it from video of the speaker")
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = {field.name: stored[field.name] for field in fields(cls)}
         except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
             raise FacesynthError(f"{path} holds no pictures of a speaker, or is damaged ({error})") from None

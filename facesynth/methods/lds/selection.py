@@ -13,7 +13,7 @@ from facesynth.methods.lds.system import Array, Clip
 from facesynth.progress import track
 
 Auto = Literal["auto"]
-LEADS_MS = (0.0, 40.0, -40.0, 80.0, 120.0)
+LEADS_MS = (0.0, 40.0, -40.0, 80.0, 120.0, 160.0)
 """Plainest first."""
 LEAD_ORDER = 4
 """Deterministic states while the lead is being chosen."""

@@ -1,0 +1,152 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from facesynth.errors import FacesynthError
+from facesynth.face.texture.compose import Report, TexturedFace, ping_pong
+from facesynth.face.texture.shapes import HeadMaps, Shapes
+from facesynth.face.texture.sources import coherent, nearest
+from facesynth.face.texture.speaker import Speaker, speaker_of
+
+HEIGHT, WIDTH = 90, 120
+
+
+@pytest.fixture(scope="module")
+def speaker():
+    """Two clips of smooth noise with 16 points whose lower half opens and shuts."""
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(0)
+    x, y = np.meshgrid(np.linspace(45, 75, 4), np.linspace(40, 65, 4))
+    rest = np.column_stack([x.ravel(), y.ravel()])
+    clips, shapes = [], []
+    for length in (12, 8):
+        opening = 3 * np.sin(0.5 * np.arange(length)) ** 2
+        points = rest + opening[:, None, None] * np.where(rest[:, 1:] > 55, [0.0, 1.0], 0.0)
+        noise = gaussian_filter(rng.uniform(0, 255, (length, HEIGHT, WIDTH, 3)), (1, 2, 2, 0))
+        clips.append((40 + 3 * (noise - noise.min())).clip(0, 255).astype(np.uint8))
+        still = HeadMaps(np.tile(np.eye(2), (length, 1, 1)), np.zeros((length, 2)))
+        shapes.append(Shapes(points, still, 25.0))
+    return speaker_of(clips, shapes)
+
+
+def test_a_recorded_shape_over_its_own_picture_is_that_picture(speaker):
+    face, report = TexturedFace(speaker), Report()
+    numbers = np.arange(20)
+    drawn = np.stack(list(face.draw(speaker.shapes, numbers, report, "nearest")))
+    chosen = face.choose(speaker.shapes, "nearest")
+    assert np.array_equal(speaker.shapes[chosen], speaker.shapes)
+    own = chosen == numbers
+    assert own.sum() > 10
+    assert np.abs(drawn[own].astype(int) - speaker.pictures[own]).max() <= 1
+    assert (report.frames, report.folded_triangles) == (20, 0)
+    assert report.real_time_factor > 0
+
+
+def test_nothing_changes_outside_the_ring(speaker):
+    face = TexturedFace(speaker)
+    shapes = speaker.shapes[[3, 5]]
+    background = np.array([14, 15])
+    drawn = np.stack(list(face.draw(shapes, background, Report())))
+    changed = (drawn != speaker.pictures[background]).any(axis=(0, 3))
+    y, x = np.nonzero(changed)
+    low, high = face.mesh.reference.min(axis=0), face.mesh.reference.max(axis=0)
+    assert changed.any()
+    assert (x >= low[0]).all()
+    assert (x <= high[0]).all()
+    assert (y >= low[1]).all()
+    assert (y <= high[1]).all()
+
+
+def test_a_moved_head_takes_the_face_along(speaker):
+    shifted = Speaker(
+        np.roll(speaker.pictures, (4, 7), axis=(1, 2)),
+        speaker.shapes,
+        speaker.linear,
+        speaker.shift + np.array([7.0, 4.0]),
+        speaker.clip_starts,
+        speaker.fps,
+    )
+    background = np.array([13, 14, 15])
+    plain = np.stack(list(TexturedFace(speaker).draw(speaker.shapes[:3], background, Report(), "nearest")))
+    moved = np.stack(list(TexturedFace(shifted).draw(shifted.shapes[:3], background, Report(), "nearest")))
+    inner = np.roll(plain, (4, 7), axis=(1, 2))[:, 15:-15, 15:-15].astype(int)
+    assert np.abs(moved[:, 15:-15, 15:-15] - inner).max() <= 1
+
+
+def test_brightness_follows_the_background(speaker):
+    dark = Speaker(
+        np.concatenate([speaker.pictures[:12], (speaker.pictures[:8] * 0.8).astype(np.uint8)]),
+        np.concatenate([speaker.shapes[:12], speaker.shapes[:8] + 30]),
+        speaker.linear,
+        speaker.shift,
+        speaker.clip_starts,
+        speaker.fps,
+    )
+    face = TexturedFace(Speaker(dark.pictures, speaker.shapes, dark.linear, dark.shift, dark.clip_starts, dark.fps))
+    drawn, _ = face._drawn(speaker.shapes[:1], np.array([0]), np.array([12]))
+    middle = (slice(45, 60), slice(52, 68))
+    assert drawn[0][middle].mean() == pytest.approx(dark.pictures[12][middle].mean(), rel=0.03)
+
+
+def test_folded_triangles_are_reported(speaker):
+    torn = speaker.shapes[:1].copy()
+    torn[0, 0] += [40, 30]
+    report = Report()
+    list(TexturedFace(speaker).draw(torn, np.array([0]), report))
+    assert report.folded_triangles > 0
+
+
+def test_the_coherent_path_is_the_best_of_all():
+    rng = np.random.default_rng(0)
+    shapes, targets, looks = rng.normal(size=(5, 3, 2)), rng.normal(size=(4, 3, 2)), rng.normal(size=(5, 6))
+    starts = np.array([True, False, False, True, False])
+    found = coherent(targets, shapes, looks, starts, jump_weight=0.7)
+    unary = ((targets[:, None] - shapes) ** 2).sum(axis=(2, 3)) / 3
+    natural = np.median([((looks[i + 1] - looks[i]) ** 2).mean() for i in (0, 1, 3)])
+    scale = 0.7 * np.median(unary.min(axis=1)) / natural
+
+    def cost(path):
+        total = sum(unary[t, i] for t, i in enumerate(path))
+        for i, j in pairwise(path):
+            free = i == j or (j == i + 1 and not starts[j])
+            total += 0 if free else scale * ((looks[i] - looks[j]) ** 2).mean()
+        return total
+
+    every = np.stack(np.meshgrid(*[np.arange(5)] * 4), axis=-1).reshape(-1, 4)
+    assert cost(found) == pytest.approx(min(cost(path) for path in every))
+
+
+def test_coherence_jumps_less_than_nearest(speaker):
+    rng = np.random.default_rng(1)
+    targets = speaker.shapes + rng.normal(scale=0.6, size=speaker.shapes.shape)
+    jumps = []
+    for path in (nearest(targets, speaker.shapes), coherent(targets, speaker.shapes, speaker.looks, speaker.clip_starts, 3.0)):
+        step = np.diff(path)
+        jumps.append(int(((step != 0) & (step != 1)).sum()))
+    assert jumps[1] < jumps[0]
+
+
+def test_saved_speakers_come_back_and_bad_files_do_not(speaker, tmp_path):
+    speaker.save(tmp_path / "speaker.npz")
+    back = Speaker.load(tmp_path / "speaker.npz")
+    assert np.array_equal(back.pictures, speaker.pictures)
+    assert np.array_equal(back.shapes, speaker.shapes)
+    assert back.fps == speaker.fps
+    whole = (tmp_path / "speaker.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    for name in ("cut.npz", "other.npz", "none.npz"):
+        with pytest.raises(FacesynthError, match=name):
+            Speaker.load(tmp_path / name)
+
+
+def test_backgrounds_go_to_and_fro():
+    assert ping_pong(3, 7, 9).tolist() == [3, 4, 5, 6, 5, 4, 3, 4, 5]
+    assert ping_pong(3, 4, 3).tolist() == [3, 3, 3]
+
+
+def test_shapes_and_backgrounds_must_be_as_many(speaker):
+    with pytest.raises(FacesynthError, match="background"):
+        list(TexturedFace(speaker).draw(speaker.shapes[:3], np.array([0]), Report()))
