@@ -19,7 +19,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("efase.safetensors"))
     parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "efase.yaml")
     parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
 
     # load
     corpus = Corpus.open(options.corpus)

@@ -15,6 +15,7 @@ import click
 @click.option("--sentences", default=24, show_default=True, help="To tune on; none of them is in the database.")
 @click.option("--test", "test_sentences", default=12, show_default=True, help="To compare found and published settings on.")
 @click.option("--generations", default=10, show_default=True, help="Of 28 evaluations each, after the first.")
+@click.option("--limit", type=click.IntRange(min=2), help="At most so many utterances in the database, evenly chosen.")
 @click.option("--workers", default=2, show_default=True)
 @click.option("--seed", default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -25,6 +26,7 @@ def tune(
     sentences: int,
     test_sentences: int,
     generations: int,
+    limit: int | None,
     workers: int,
     seed: int,
     as_json: bool,
@@ -39,6 +41,8 @@ def tune(
     from facesynth.methods.efase.tuning import tune as search
 
     database, tuning, test = split_for_tuning(Corpus.open(corpus), sentences, test_sentences, seed)
+    if limit and len(database) > limit:
+        database = database.subset([database.ids[i * len(database) // limit] for i in range(limit)])
     model = Efase().fit(database, seed=seed)
     journal = output.with_suffix(".jsonl")
     found = search(model, tuning, test, journal=journal, generations=generations, seed=seed, workers=workers)

@@ -34,7 +34,9 @@ def random_query(rng, nodes, count, phones=5, emotions=2, fixed=0):
     phone = rng.integers(-1, phones, count)
     emotion = rng.integers(-1, emotions, count)
     places = rng.choice(count, fixed, replace=False)
-    return Query(phone, np.where(phone < 0, -1, phone // 2), emotion, {int(t): int(rng.integers(len(nodes))) for t in places})
+    constraints = {int(t): int(rng.integers(len(nodes))) for t in places}
+    strict = (phone == 0) & (rng.random(count) < 0.5) & ~np.isin(np.arange(count), places)
+    return Query(phone, np.where(phone < 0, -1, phone // 2), emotion, constraints, strict)
 
 
 @pytest.mark.parametrize("pnt", [0.01, 1.0, 30.0, 1000.0])

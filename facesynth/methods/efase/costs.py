@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
 from facesynth.motion.warp import time_warp
@@ -47,6 +48,8 @@ class Query:
     """[T] index of the wanted emotion, -1 for any."""
     fixed: Mapping[int, int]
     """Hard constraints: position in the input -> node."""
+    strict: NDArray[np.bool_] | None = None
+    """[T] where no node of another viseme class is allowed; nowhere if it is None."""
 
     def __len__(self) -> int:
         return len(self.phones)
@@ -61,6 +64,8 @@ def target_costs(nodes: MotionNodes, query: Query, t: int, weights: Weights) -> 
         cost += np.where(other, np.where(same_viseme, weights.gamma, 1.0) * weights.delta * weights.pnt, 0.0)
     if query.emotions[t] >= 0:
         cost += np.where(nodes.emotions != query.emotions[t], weights.phi * weights.pnt, 0.0)
+    if query.strict is not None and query.strict[t]:
+        cost[nodes.visemes != query.visemes[t]] = np.inf
     if t in query.fixed:
         cost[np.arange(len(nodes)) != query.fixed[t]] = np.inf
     return cost

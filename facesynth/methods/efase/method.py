@@ -12,12 +12,13 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
 from facesynth.methods.efase.costs import Query, Weights
 from facesynth.methods.efase.database import build_database
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.explanation import explain, shares
-from facesynth.methods.efase.intensity import blend, close_lips
+from facesynth.methods.efase.intensity import blend
 from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import Plan, plan_speech
@@ -28,12 +29,14 @@ from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
 from facesynth.motion.pca import Pca
 from facesynth.motion.resample import resample
-from facesynth.speech.phones import PHONES, SILENCE, viseme_of
+from facesynth.speech.phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
 from facesynth.speech.speech import Speech
 
 NODE_FIELDS = ("starts", "stops", "phones", "visemes", "emotions", "before", "after")
 FOREST_FIELDS = ("order", "starts", "stops", "left", "right", "centres", "radii", "roots", "tree_of")
 NEUTRAL = "neutral"
+LIP_PHONES = BILABIALS | LABIODENTALS
+"""Never said by another viseme class while their own has a node: everybody sees lips that do not close."""
 
 
 @register("efase")
@@ -147,13 +150,16 @@ class Efase(Method):
         _ = self.fitted_layout
         _, bounds = self._phones(speech)
         intensity = speech.emotions.per_phone(speech.phones)[1]
-        frames = self._decode(speech, self.plan(speech, constraints=constraints))
+        layout, database_fps = self.fitted_layout, self.config["database_fps"]
+        plans = [self.plan(speech, constraints=constraints)]
+        frames = self._decode(speech, plans[0])
         if (intensity < 1).any() and NEUTRAL in self.emotions:
-            neutral = self._decode(speech, self.plan(speech, emotion=NEUTRAL, constraints=constraints), NEUTRAL)
-            mixed = blend(neutral, frames, intensity, bounds, self.config["database_fps"])
-            sources, labels = (neutral, frames), speech.phones.labels
-            frames = close_lips(mixed, sources, self.fitted_layout, labels, bounds, self.config["database_fps"])
-        motion = Motion(frames.astype(np.float32), self.config["database_fps"], self.fitted_layout)
+            plans.append(self.plan(speech, emotion=NEUTRAL, constraints=constraints))
+            frames = blend(self._decode(speech, plans[1], NEUTRAL), frames, intensity, bounds, database_fps)
+        if has_lips(layout):
+            wanted = np.max([self._closures(plan, speech.phones.labels) for plan in plans], axis=0)
+            frames = close_lips(frames, wanted, layout, bounds, database_fps)
+        motion = Motion(frames.astype(np.float32), database_fps, layout)
         return _of_length(resample(motion, fps or self.fps), speech)
 
     def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
@@ -195,14 +201,26 @@ class Efase(Method):
             self.register_buffer(f"forest_{field}", torch.from_numpy(getattr(forest, field)))
         self.register_buffer("nearest", torch.from_numpy(self._index.tables.nearest))
 
+    def _closures(self, plan: Plan, labels: Sequence[str]) -> Floats:
+        """[P] smallest lip gap of the node at each p, b, m as it was captured; NaN elsewhere."""
+        nodes, wanted = self.nodes(), np.full(len(labels), np.nan)
+        for k, (label, node) in enumerate(zip(labels, plan.nodes, strict=True)):
+            if label in BILABIALS and node >= 0:
+                wanted[k] = gap(decode(self.pca, nodes.motion(int(node))), self.fitted_layout).min()
+        return wanted
+
     def _query(self, speech: Speech, emotion: str | None, constraints: Mapping[int, str]) -> Query:
         labels, _ = self._phones(speech)
         felt = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
+        fixed = {t: self._node_index(t, name, labels) for t, name in constraints.items()}
+        captured = set(self.node_table[NODE_FIELDS.index("visemes")].unique().tolist())
+        strict = [label in LIP_PHONES and viseme_of(label) in captured and t not in fixed for t, label in enumerate(labels)]
         return Query(
             np.array([-1 if label == SILENCE else PHONES.index(label) for label in labels]),
             np.array([-1 if label == SILENCE else viseme_of(label) for label in labels]),
             np.array([self._emotion_index(e) for e in felt]),
-            {t: self._node_index(t, name, labels) for t, name in constraints.items()},
+            fixed,
+            np.array(strict),
         )
 
     def _phones(self, speech: Speech) -> tuple[tuple[str, ...], np.ndarray]:

@@ -49,4 +49,5 @@ def part(query: Query, places: Ints) -> Query:
     """The query at consecutive positions."""
     first = int(places[0])
     fixed = {t - first: node for t, node in query.fixed.items() if first <= t <= places[-1]}
-    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed)
+    strict = None if query.strict is None else query.strict[places]
+    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed, strict)

@@ -188,6 +188,8 @@ def _tree_targets(index: SearchIndex, query: Query) -> Floats:
     same_viseme = index.tables.tree_visemes == query.visemes[:, None]
     other = np.where(same_viseme, weights.gamma, 1.0) * weights.delta * weights.pnt
     cost = np.where((wanted >= 0) & (index.tree_phones != wanted), other, 0.0)
+    if query.strict is not None:
+        cost[query.strict[:, None] & ~same_viseme] = np.inf
     feeling = query.emotions[:, None]
     return cost + np.where((feeling >= 0) & (index.tree_emotions != feeling), weights.phi * weights.pnt, 0.0)
 

@@ -30,7 +30,7 @@ from facesynth.methods.efase.nodes import Floats
 from facesynth.motion.resample import resample
 
 RANGES: dict[str, tuple[float, float]] = {
-    "penalty": (1.0, 100.0),
+    "penalty": (5.0, 100.0),
     "alpha": (0.3, 30.0),
     "beta": (0.05, 50.0),
     "eta": (0.05, 50.0),
