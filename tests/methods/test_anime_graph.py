@@ -147,6 +147,13 @@ def test_explains_every_phone(unseen):
     assert all(":" in r["node"] for r in rows)
 
 
+def test_reports_what_others_expressed_and_where_it_jumped(unseen):
+    model, utterance = unseen
+    report, plan = model.report(utterance.speech), model.plan(utterance.speech)
+    assert 0 <= report["other_visemes"] <= report["other_phones"] <= 1
+    assert len(model.joins(utterance.speech)) == plan.jumps.sum() == plan.summary()["jumps"]
+
+
 def test_bad_speech_is_one_clear_line(model, corpus):
     utterance = next(iter(corpus))
     length = utterance.speech.duration_s

@@ -19,7 +19,7 @@ from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
-from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
+from facesynth.methods.anime_graph.graph import PHONE_INDEX, VISEMES, Graph
 from facesynth.methods.anime_graph.lowpass import cutoffs_hz, low_pass
 from facesynth.methods.anime_graph.mapping import (
     MapSettings,
@@ -267,6 +267,22 @@ class AnimeGraph(Method):
     def plan(self, speech: Speech, *, look_ahead: int | None = None) -> Plan:
         """The path through the graph that expresses speech."""
         return make_plan(self.chooser, self.wishes(speech), self.components.metric.numpy(), self.weights, look_ahead)
+
+    def report(self, speech: Speech) -> dict[str, float]:
+        """Shares of phones said by another phone, viseme class or emotion; `plan(speech).summary()` tells more."""
+        plan = self.plan(speech)
+        phones, feelings = (np.array([getattr(w, name) for w in plan.wishes]) for name in ("phone", "emotion"))
+        said, felt = self.graph.phones[plan.nodes], self.graph.emotions[plan.nodes]
+        return {
+            "other_phones": float((said != phones).mean()),
+            "other_visemes": float((VISEMES[said] != VISEMES[phones]).mean()),
+            "other_emotions": float((felt != feelings).mean()),
+        }
+
+    def joins(self, speech: Speech) -> NDArray[np.int64]:
+        """First frames of the phones that were jumped to."""
+        plan = self.plan(speech)
+        return speech.phones.frame_bounds(self.fps)[1:-1][plan.jumps]
 
     def explain(self, speech: Speech) -> list[dict[str, Any]]:
         """Per phone: the chosen node, its cost terms, the runners-up by audio, and what it lacks."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -61,6 +61,15 @@ class DetectorSettings:
     cost: float = 3.0
     nu: float = 0.5
     normalise: bool = False
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> Self:
+        """Settings from a dictionary; an unknown key is answered with the nearest known one."""
+        known = [f.name for f in fields(cls)]
+        for key in config:
+            if key not in known:
+                raise unknown("emotion setting", key, known)
+        return cls(**config)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,81 @@
+"""Build an anime graph from a corpus, speak its held-out sentences, judge its emotion maps, save the model.
+
+python train/anime_graph.py CORPUS -o anime_graph.safetensors [--maps] [--config configs/anime_graph.yaml] [variance=0.98 …]
+"""
+
+import argparse
+from itertools import permutations
+from pathlib import Path
+
+from facesynth.config import load_config, parse_settings
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.evaluation.geometry import lve, marker_error
+from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.anime_graph.parallel import take_of
+from facesynth.methods.anime_graph.report import MapTrial
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
+    parser.add_argument("-o", "--output", type=Path, default=Path("anime_graph.safetensors"))
+    parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "anime_graph.yaml")
+    parser.add_argument("--maps", action="store_true", help="map left-out sentences for every pair of emotions")
+    parser.add_argument("--folds", type=int, default=10, help="groups in which sentences are left out for --maps")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_intermixed_args()
+
+    # load
+    corpus = Corpus.open(options.corpus)
+    learn, held_out = corpus.split(options.seed)
+    settings = {**load_config(options.config), **parse_settings(options.settings)}
+
+    # fit
+    model = AnimeGraph.from_config(settings).fit(learn, seed=options.seed)
+    print(f"{len(learn)} utterances, {len(model.graph)} nodes, {model.components.count} components")
+    for row, cutoff_hz in zip(model.facts["components"], model.cutoffs_hz.tolist(), strict=False):
+        print(f"  component {row['component']:2d} ({row['block']}): {row['is']}, emotion ratio {row['emotion_ratio']:.2f}, "
+              f"mouth share {row['mouth_share']:.3f}, cut-off {cutoff_hz:.1f} Hz")  # fmt: skip
+
+    # evaluate: sentences it has not seen
+    unit = corpus.layout.unit
+    for utterance in held_out:
+        made, plan = model.synthesize(utterance.speech), model.plan(utterance.speech)
+        print(f"{utterance.id}: marker error {marker_error(made, utterance.motion):.3f} {unit}, "
+              f"{_lips(made, utterance.motion)}{plan.jumps.sum()} jumps in {len(plan.path)} phones")  # fmt: skip
+
+    # evaluate: emotions on sentences left out
+    if options.maps:
+        report_maps(model, corpus, options.folds)
+
+    # save
+    model.save(options.output)
+    print(f"saved {options.output}")
+
+
+def _lips(made, truth) -> str:  # type: ignore[no-untyped-def]
+    has_lips = "mouth" in truth.layout.groups and truth.layout.dimension > 1
+    return f"lips {lve(made, truth):.3f} {truth.layout.unit}, " if has_lips else ""
+
+
+def report_maps(model: AnimeGraph, corpus: Corpus, folds: int) -> None:
+    """Unit-cube RMS of every ordered pair, and how it falls with the number of parallel sentences."""
+    takes = [take for take in (take_of(u, model.components) for u in corpus) if take is not None]
+    trial = MapTrial(takes, model.split, model.components, corpus.layout, model.map_settings.centres)
+    for source, target in permutations(corpus.emotions, 2):
+        try:
+            score = trial.score(source, target, folds=folds)
+        except FacesynthError as error:
+            print(error)
+            continue
+        widths = ", ".join(f"{name} {value:.5f}" for name, value in score.mapped.items())
+        print(f"{source} to {target}, {score.sentences} sentences: unchanged {score.unchanged:.5f}, "
+              f"mean difference {score.mean_difference:.5f}, {widths}; best: {score.best}")  # fmt: skip
+        curve = trial.learning_curve(source, target, model.map_settings)
+        print("  by sentences learned from: " + ", ".join(f"{count}: {value:.5f}" for count, value in curve.items()))
+
+
+if __name__ == "__main__":
+    main()
