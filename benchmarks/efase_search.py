@@ -128,7 +128,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpus", help="folder of a corpus to take the nodes from")
     parser.add_argument("--phones", type=int, default=63)
-    parser.add_argument("--penalty", type=float, nargs="+", default=[10.0, 3.0, 1.0], help="PNT over the median rule-2 cost")
+    parser.add_argument("--penalty", type=float, nargs="+", default=[10.0], help="PNT over the median rule-2 cost")
     options = parser.parse_args()
     torch.manual_seed(0)
     everything = corpus_nodes(options.corpus) if options.corpus else None

@@ -9,7 +9,7 @@ from pathlib import Path
 from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
 from facesynth.evaluation.geometry import lve, marker_error
-from facesynth.methods.registry import create
+from facesynth.methods.efase.method import Efase
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = create("efase", **settings).fit(learn, seed=options.seed)
+    model = Efase.from_config(settings).fit(learn, seed=options.seed)
     print(f"{len(learn)} utterances, {len(model.facts['names'])} nodes, {model.facts['unusable_phones']} phones unusable")
 
     # evaluate

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from facesynth.methods.method import Method
 
 MAIN = (
     "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
@@ -48,7 +53,7 @@ def evaluate(
     train, test = Corpus.open(corpus).split(seed, test_share)
     if test_limit and len(test) > test_limit:
         test = test.subset([test.ids[i * len(test) // test_limit] for i in range(test_limit)])
-    candidates = {}
+    candidates: dict[str, Callable[[], Method]] = {}
     for method in methods:
         name, _, config = method.partition("=")
         settings = load_config(config) if config else {}

@@ -12,6 +12,7 @@ import click
 from facesynth.errors import FacesynthError
 
 if TYPE_CHECKING:
+    from facesynth.methods.efase.method import Efase
     from facesynth.methods.method import Method
     from facesynth.speech.hearing import Heard
 
@@ -138,7 +139,7 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
         write_textgrid(grid, heard.speech.phones, heard.words)
         written.append(str(grid))
     if options["explain"]:
-        write_text(options["explain"], json.dumps(method.explain(heard.speech, **settings), indent=1))
+        write_text(options["explain"], json.dumps(_as_efase(method).explain(heard.speech, **settings), indent=1))
         written.append(str(options["explain"]))
     return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written}
 
@@ -157,15 +158,21 @@ def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
 
 
 def _method_options(method: Method, heard: Heard, options: dict[str, Any]) -> dict[str, Any]:
-    if not (options["constraints"] or options["explain"]):
-        return {}
-    if not hasattr(method, "explain"):
-        raise FacesynthError(f"{method.name} has no nodes to constrain or explain; efase has")
+    if options["constraints"] or options["explain"]:
+        _as_efase(method)
     if not options["constraints"]:
         return {}
     from facesynth.methods.efase.constraints import read_constraints
 
     return {"constraints": read_constraints(options["constraints"], heard.speech.phones)}
+
+
+def _as_efase(method: Method) -> Efase:
+    from facesynth.methods.efase.method import Efase
+
+    if not isinstance(method, Efase):
+        raise FacesynthError(f"{method.name} has no nodes to constrain or explain; efase has")
+    return method
 
 
 def _given_text(options: dict[str, Any]) -> str | None:

@@ -31,10 +31,11 @@ def smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiffn
 
 def _spline(piece: Floats, weights: Floats, stiffness: float) -> Floats:
     at = np.arange(len(piece), dtype=float)
-    return np.asarray(make_smoothing_spline(at, piece, w=weights, lam=stiffness)(at), np.float64)
+    smooth: Floats = make_smoothing_spline(at, piece, w=weights, lam=stiffness)(at).astype(np.float64)
+    return smooth
 
 
 def _penalised(piece: Floats, weights: Floats, stiffness: float) -> Floats:
     """The same with second differences for the derivative: SciPy's spline wants five points."""
     bend = np.diff(np.eye(len(piece)), n=2, axis=0)
-    return np.linalg.solve(np.diag(weights) + stiffness * bend.T @ bend, weights[:, None] * piece)
+    return np.linalg.solve(np.diag(weights) + stiffness * bend.T @ bend, weights[:, None] * piece).astype(np.float64)

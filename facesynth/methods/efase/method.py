@@ -213,7 +213,7 @@ class Efase(Method):
         labels, _ = self._phones(speech)
         felt = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
         fixed = {t: self._node_index(t, name, labels) for t, name in constraints.items()}
-        captured = set(self.node_table[NODE_FIELDS.index("visemes")].unique().tolist())
+        captured = set(self.node_table[NODE_FIELDS.index("visemes")].tolist())
         strict = [label in LIP_PHONES and viseme_of(label) in captured and t not in fixed for t, label in enumerate(labels)]
         return Query(
             np.array([-1 if label == SILENCE else PHONES.index(label) for label in labels]),
