@@ -16,6 +16,10 @@ from facesynth.errors import FacesynthError
 LONGEST_S = 3600.0
 FEWEST_FRAMES = 5
 """With a face in fewer frames there is nothing to learn from."""
+DOUBTFUL = 0.5
+"""A frame whose log odds of a face are under this share of the clip's median shows a damaged picture, or a hand.
+
+In clips that begin with half-decoded pictures those lie at 0 to 9, whole pictures at 18 to 28."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +68,11 @@ def _followed(tracker: Tracker, image: Image, is_check: bool, path: Path) -> See
 
 
 def _track(seen: dict[int, Seen | None], fps: float, path: Path) -> Track:
+    certain = np.median([face.logit for face in seen.values() if face is not None] or [0.0])
     count = max(seen, default=-1) + 1
     points, irises = np.full((count, POINTS, 3), np.nan, np.float32), np.full((count, 2, 2), np.nan, np.float32)
     for slot, face in seen.items():
-        if face is not None:
+        if face is not None and face.logit >= DOUBTFUL * certain:
             points[slot], irises[slot] = face.points, face.irises
     track = Track(points, irises, fps)
     if track.present.sum() < FEWEST_FRAMES:

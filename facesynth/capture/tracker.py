@@ -19,8 +19,8 @@ from facesynth.errors import FacesynthError
 
 POINTS = 468
 MESH_PIXELS, IRIS_PIXELS = 192, 64
-PRESENT = 0.5
-"""Score from which what the mesh was laid on is a face."""
+PRESENT_LOGIT = 0.0
+"""Log odds from which what the mesh was laid on is a face."""
 FACE_MARGIN, EYE_MARGIN = 1.5, 2.3
 """Sides of what the networks look at, over the face's own size and the eye's width."""
 EYES = ((33, 133), (263, 362))
@@ -35,6 +35,8 @@ class Seen:
     """[468, 3] px: right and down in the picture, and away from the camera on the same scale."""
     irises: NDArray[np.float32]
     """[2, 2] px: middle of the performer's right and left iris."""
+    logit: float
+    """How sure the mesh is of a face: log odds."""
 
 
 @dataclass(eq=False)
@@ -84,11 +86,13 @@ class Tracker:
 
     def _look(self, image: Image, square: Square) -> Seen | None:
         points, score = self._mesh.run(None, {"input": square.cut(image, MESH_PIXELS)[None]})
-        if score.ravel()[0] < np.log(PRESENT / (1 - PRESENT)):
+        logit = float(score.ravel()[0])
+        if logit < PRESENT_LOGIT:
             return None
         places = points.reshape(POINTS, 3).astype(np.float64) / MESH_PIXELS
         world = np.concatenate([square.in_picture(places[:, :2]), places[:, 2:] * square.side_px], axis=1)
-        return Seen(world.astype(np.float32), np.array([self._iris_of(image, world[list(eye), :2]) for eye in EYES], np.float32))
+        irises = np.array([self._iris_of(image, world[list(eye), :2]) for eye in EYES], np.float32)
+        return Seen(world.astype(np.float32), irises, logit)
 
     def _iris_of(self, image: Image, corners: NDArray[np.float64]) -> NDArray[np.float64]:
         """[2] middle of an iris (px). The network knows left eyes, as they stand in the picture; a right one is mirrored."""

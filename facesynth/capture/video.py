@@ -43,17 +43,19 @@ def open_video(path: Path) -> Iterator[Pictures]:
         with av.open(str(path)) as container:
             stream = _stream(container, path)
             yield Pictures(_rate(stream, path), _decoded(container, stream, path))
-    except av.FFmpegError as error:
-        raise FacesynthError(f"{path} cannot be read as video ({error.strerror}); is it damaged?") from None
+    except (av.FFmpegError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", "") or error
+        raise FacesynthError(f"{path} cannot be read as video ({reason}); is it damaged?") from None
 
 
 def _stream(container: InputContainer, path: Path) -> Any:
     if not container.streams.video:
         raise FacesynthError(f"{path} has no pictures in it; give a video, or a motion file beside the sound")
     stream = container.streams.video[0]
+    width, height = (getattr(stream.codec_context, side, 0) for side in ("width", "height"))
+    if not 0 < max(width, height) <= LARGEST_PX:
+        raise FacesynthError(f"{path} has pictures of {width} × {height} in a form that is not known; is it damaged?")
     stream.thread_type = "NONE"
-    if not 0 < max(stream.width, stream.height) <= LARGEST_PX:
-        raise FacesynthError(f"{path} has pictures of {stream.width} × {stream.height}; is it damaged?")
     return stream
 
 
