@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract"})
 def _accumulate(wanted, heard, total, steps):  # type: ignore[no-untyped-def]
     """Fill total [m, L] with the least accumulated distance, steps with where it came from; a monotone DTW.
 

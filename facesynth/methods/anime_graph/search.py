@@ -36,7 +36,7 @@ class Step:
     """[n] the candidate of the phone before that was recorded just before this one, or -1."""
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract"})
 def _advance(phi, last, first, link, price):  # type: ignore[no-untyped-def]
     """One step of Viterbi: for each candidate j the least phi_i + (cost of the step i to j), and that i.
 
