@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.motion.layout import Layout
+from facesynth.speech.phones import BILABIALS
+from facesynth.speech.speech import PhoneTrack
 
-SHUT_SHARE = 0.1
+SHUT_SHARE = 0.25
 """Lips count as shut up to this share of the way from the narrowest gap to a wide one …"""
-OPEN_SHARE = 0.3
+OPEN_SHARE = 0.6
 """… and as open from this share on; between them they are held together less and less."""
+
+CLOSING_S = 0.04
+"""Lips take at least this long to close and to open, seconds."""
 
 
 def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
@@ -25,12 +32,60 @@ def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout:
     points, old = layout.points(changed.copy()), layout.points(before)
     shut = _shut(old[:, upper, 1] - old[:, lower, 1])[..., None]
     apart = (points[:, upper] - points[:, lower]) - (old[:, upper] - old[:, lower])
-    correction = shut * apart / 2
+    _bring_together(points, layout, shut * apart / 2)
+    return points.reshape(changed.shape)
+
+
+def close_at(
+    frames: NDArray[np.float64], layout: Layout, spans: Iterable[tuple[int, int]], gap: float, fps: float
+) -> NDArray[np.float64]:
+    """Frames [T, C] whose lips come as near to each other as `gap` within each span of frames.
+
+    Blending and smoothing open the lips a little where a p, b or m shuts them. What is missing is added around the
+    narrowest frame, and fades within half the span or 40 ms, whichever is longer.
+    """
+    if layout.dimension < 2 or not layout.lip_pairs:
+        return frames
+    upper, lower = np.array(layout.lip_pairs).T
+    points = layout.points(frames.copy())
+    for start, stop in spans:
+        heights = (points[start:stop, upper, 1] - points[start:stop, lower, 1]).mean(axis=1)
+        if not len(heights) or heights.min() <= gap:
+            continue
+        middle, reach = start + int(heights.argmin()), max((stop - start) / 2, CLOSING_S * fps) + 1
+        near = np.arange(max(0, int(middle - reach)), min(len(points), int(middle + reach) + 1))
+        amount = 0.5 + 0.5 * np.cos(np.pi * np.clip((near - middle) / reach, -1, 1))
+        correction = np.zeros((len(near), len(upper), layout.dimension))
+        correction[..., 1] = (amount * (heights.min() - gap))[:, None] / 2
+        some = points[near]
+        _bring_together(some, layout, correction)
+        points[near] = some
+    return points.reshape(frames.shape)
+
+
+def narrowest_gaps(frames: NDArray[np.float32], layout: Layout, spans: Iterable[tuple[int, int]]) -> list[float]:
+    """The smallest opening of the inner lips in each span of frames [T, C] that has no missing samples."""
+    if layout.dimension < 2 or not layout.lip_pairs:
+        return []
+    upper, lower = np.array(layout.lip_pairs).T
+    points = layout.points(frames)
+    openings = [(points[a:b, upper, 1] - points[a:b, lower, 1]).mean(axis=1) for a, b in spans if b > a]
+    return [float(opening.min()) for opening in openings if np.isfinite(opening).all()]
+
+
+def bilabial_spans(phones: PhoneTrack, fps: float) -> list[tuple[int, int]]:
+    """First frame and one past the last of each p, b, m."""
+    bounds = phones.frame_bounds(fps).tolist()
+    return [(a, b) for label, a, b in zip(phones.labels, bounds[:-1], bounds[1:], strict=True) if label in BILABIALS]
+
+
+def _bring_together(points: NDArray[np.float64], layout: Layout, correction: NDArray[np.float64]) -> None:
+    """Move upper lip points [T, K, dimension] by minus and lower ones by plus the correction [T, pairs, dimension]."""
+    upper, lower = np.array(layout.lip_pairs).T
     for group, own, sign in (("upper_lip", upper, -1), ("lower_lip", lower, 1)):
         others = np.setdiff1d(layout.group(group) if group in layout.groups else own, own)
         points[:, others] += sign * correction.mean(axis=1, keepdims=True)
         points[:, own] += sign * correction
-    return points.reshape(changed.shape)
 
 
 def _shut(gaps: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
-from facesynth.methods.anime_graph.closure import keep_shut
+from facesynth.methods.anime_graph.closure import bilabial_spans, close_at, keep_shut, narrowest_gaps
 from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, VISEMES, Graph
@@ -77,7 +77,7 @@ class AnimeGraph(Method):
 
     def __init__(
         self,
-        variance: float = 0.95,
+        variance: float = 0.98,
         parameters: int = 9,
         jump_weight: float = 100.0,
         jump_cost_weight: float = 1.0,
@@ -116,10 +116,13 @@ class AnimeGraph(Method):
         some = frames[:: max(1, len(frames) // MOST_FRAMES)]
         self.components.fit(some, corpus.layout, variance=self.config["variance"], seed=seed)
         builder = GraphBuilder(self.components, self.audio, self.emotions, corpus.removed_nodes())
-        takes = []
+        takes, gaps = [], []
         for utterance in track(corpus, "anime graph", len(corpus)):
             builder.add(utterance)
             takes.append(take_of(utterance, self.components))
+            spans = bilabial_spans(utterance.speech.phones, self.fps)
+            gaps += narrowest_gaps(utterance.motion.frames, corpus.layout, spans)
+        self.facts["closed_gap"] = float(np.median(gaps)) if gaps else None
         graph = builder.build()
         for name, tensor in graph.tensors().items():
             self.nodes.register_buffer(name, tensor)
@@ -222,7 +225,7 @@ class AnimeGraph(Method):
         """
         plan = self.plan(speech, look_ahead=look_ahead)
         moved, _ = blend(self.chooser, plan, self.fps)
-        motion = self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps))
+        motion = self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps), speech)
         motion = self._with_intensity(motion, speech)
         return self._mapped_to(motion, speech, to_emotion, to_intensity) if to_emotion is not None else motion
 
@@ -303,5 +306,10 @@ class AnimeGraph(Method):
             for label, emotion, (a, b), length in zip(speech.phones.labels, feelings, heard.tolist(), lengths, strict=True)
         ]
 
-    def _motion(self, components: NDArray[np.float64]) -> Motion:
-        return Motion(self.components.decode_array(components).astype(np.float32), self.fps, self.fitted_layout)
+    def _motion(self, components: NDArray[np.float64], speech: Speech) -> Motion:
+        """Components [T, D] as motion whose lips close at every p, b, m as they do in the recordings."""
+        frames = self.components.decode_array(components)
+        if self.facts["closed_gap"] is not None:
+            spans = bilabial_spans(speech.phones, self.fps)
+            frames = close_at(frames, self.fitted_layout, spans, self.facts["closed_gap"], self.fps)
+        return Motion(frames.astype(np.float32), self.fps, self.fitted_layout)
