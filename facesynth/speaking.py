@@ -93,6 +93,10 @@ def write_performance(path: str | Path, performance: Performance, rig: Rig, size
 def rendered(animation: FaceAnimation, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
     """Pictures [h, w, 3] of the face, one for each frame."""
     for k in track(range(len(animation)), "rendering"):
-        yield renderer.render(
-            pose(rig, animation.weights[k], animation.head[k], animation.gaze[k], float(animation.tongue_up[k]))
-        )
+        yield picture(animation, k, rig, renderer)
+
+
+def picture(animation: FaceAnimation, k: int, rig: Rig, renderer: Renderer) -> NDArray[np.uint8]:
+    """The face [h, w, 3] at frame k."""
+    vertices = pose(rig, animation.weights[k], animation.head[k], animation.gaze[k], float(animation.tongue_up[k]))
+    return renderer.render(vertices)

@@ -12,7 +12,9 @@ import click
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
+    from facesynth.face.rig import Rig
     from facesynth.methods.method import Method
+    from facesynth.speaking import Performance
     from facesynth.speech.speech import Speech
 
 
@@ -68,7 +70,31 @@ def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
     for path in written:
         write_performance(path, performance, rig, pixels)
         clock.step(path.suffix, f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+    written.append(_strip(output / "demo.png", performance, rig))
+    clock.step(".png", f"{written[-1]}: one picture of each emotion")
     _report(clock, written, fresh, corpus.path, as_json)
+
+
+def _strip(path: Path, performance: Performance, rig: Rig) -> Path:
+    """The face in the middle of each emotion, side by side, where the mouth is widest open around it."""
+    import numpy as np
+    from PIL import Image
+
+    from facesynth.atomic import atomic_path
+    from facesynth.face.render import Renderer
+    from facesynth.speaking import picture
+
+    animation, track = performance.animation, performance.speech.emotions
+    renderer = Renderer(rig, (480, 540))
+    starts = np.concatenate([[0.0], track.ends_s[:-1]])
+    pictures = []
+    for start, end in zip(starts, track.ends_s, strict=True):
+        inner = slice(int((0.35 * end + 0.65 * start) * animation.fps), int((0.75 * end + 0.25 * start) * animation.fps))
+        k = inner.start + int(animation.weight("jawOpen")[inner].argmax())
+        pictures.append(picture(animation, k, rig, renderer))
+    with atomic_path(path) as part:
+        Image.fromarray(np.hstack(pictures)).save(part, format="PNG")
+    return path
 
 
 def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
@@ -115,4 +141,4 @@ def _report(clock: Clock, written: list[Path], fresh: bool, corpus: Path, as_jso
         return
     again = "" if fresh or first is None else f"; the first run, which built everything, took {first:.1f} s"
     click.echo(f"done in {clock.total_s:.1f} s{again}")
-    click.echo(f"watch {written[-1]}; the synthetic performer's recordings are in {corpus}")
+    click.echo(f"watch {written[-2]}; the synthetic performer's recordings are in {corpus}")
