@@ -37,7 +37,9 @@ class Pca(nn.Module):
         """
         frames = np.asarray(frames, np.float64)
         if frames.ndim != 2 or len(frames) < 2 or not np.isfinite(frames).all():
-            raise FacesynthError(f"PCA needs at least 2 complete frames [N, C]; got shape {frames.shape} (NaN and gaps left out?)")
+            raise FacesynthError(
+                f"PCA needs at least 2 complete frames [N, C]; got shape {frames.shape} (NaN and gaps left out?)"
+            )
         mean = frames.mean(axis=0)
         covariance = np.cov(frames - mean, rowvar=False).reshape(frames.shape[1], -1)
         variance, directions = np.linalg.eigh(covariance)

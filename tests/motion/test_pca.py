@@ -22,7 +22,9 @@ def test_basis_is_orthonormal_so_distances_survive(frames):
     pca = Pca.fit(frames, 12)
     z = pca.encode(torch.from_numpy(frames).float())
     torch.testing.assert_close(pca.basis.T @ pca.basis, torch.eye(12), atol=1e-5, rtol=0)
-    np.testing.assert_allclose(torch.cdist(z[:5], z[5:9]).numpy(), np.linalg.norm(frames[:5, None] - frames[5:9], axis=-1), rtol=1e-3)
+    np.testing.assert_allclose(
+        torch.cdist(z[:5], z[5:9]).numpy(), np.linalg.norm(frames[:5, None] - frames[5:9], axis=-1), rtol=1e-3
+    )
 
 
 def test_share_of_variance_picks_the_three_directions_that_matter(frames):
