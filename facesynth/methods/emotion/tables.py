@@ -47,7 +47,8 @@ def recognise(
 ) -> Recognition:
     """Train and test under one split; x [N, F]: features of the clips, if they are known.
 
-    `by sentence` and `by speaker` leave each one out in turn (of more than 10, some together); of the halves, the first trains and the second tests.
+    `by sentence` and `by speaker` leave each one out in turn, of more than 10 some together; of the halves, the first
+    trains and the second tests.
     With `settings.normalise` each tested speaker is normalised by all of that speaker's recordings.
     """
     x = EmotionDetector(settings).features_of(clips) if x is None else x
