@@ -132,6 +132,38 @@ def add(
     _leave_if_nothing(not report.added and not report.unchanged, report.refused, "no recording was added")
 
 
+@corpus_group.command("convert")
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("-o", "--output", "folder", type=FOLDER, required=True, help="Folder for the files made.")
+@click.option(
+    "--layout",
+    "layout_file",
+    type=FILE,
+    help="YAML or JSON that names channels and groups; what files say themselves, otherwise.",
+)
+@click.option("--fps", type=click.FloatRange(1, 1000), help="Rate of files that do not state theirs.")
+@click.option(
+    "--axes", default="x,y,z", show_default=True, help="C3D: axes that run to the performer's left, up, and out of the face."
+)
+@as_json
+def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps: float | None, axes: str, as_json: bool) -> None:
+    """Turn recordings of other systems into files for `corpus add`.
+
+    FILES are files or folders of C3D, Live Link Face CSV, articulography (MVIEW .mat), BEAT2 poses, or CSV, NPZ and MAT of
+    any points or curves (named by --layout, or by channels.txt beside them). Motion, and sound and phones where the files
+    hold them, are written to the output folder, with a layout.yaml for `corpus new --layout`.
+    """
+    from facesynth.corpus.importers.convert import LAYOUT
+    from facesynth.corpus.importers.convert import convert as convert_files
+
+    report = convert_files(files, folder, layout=_read_layout(layout_file) if layout_file else None, fps=fps, axes=axes)
+    lines = [f"converted {len(report.converted)}, not usable {len(report.refused)}"]
+    if report.converted:
+        lines.append(f"make their corpus with `facesynth corpus new NAME --layout {folder / LAYOUT} --fps {report.fps:g} …`")
+    _show(as_json, asdict(report), [*lines, *_listing("not converted", report.refused), *_remarks(report.remarks)])
+    _leave_if_nothing(not report.converted, report.refused, "nothing was converted")
+
+
 @corpus_group.command("align")
 @click.argument("folder", type=FOLDER)
 @click.option("--id", "ids", multiple=True, help="Only this utterance; may be given several times.")

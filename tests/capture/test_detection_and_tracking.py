@@ -29,7 +29,7 @@ def tracker(face, *xs):
 
 
 def test_several_faces_are_refused_or_chosen_from_the_left():
-    with pytest.raises(FacesynthError, match="2 faces.*--face"):
+    with pytest.raises(FacesynthError, match=r"2 faces.*--face"):
         tracker(None, 20, 80)._find(None)
     with pytest.raises(FacesynthError, match="2 faces"):
         tracker(None, 20, 80).check_alone(None)

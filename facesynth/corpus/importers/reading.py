@@ -1,0 +1,73 @@
+"""A recording as another system keeps it: motion, and whatever else lies in the same file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+from facesynth.speech.segments import Segment
+from facesynth.speech.speech import PhoneTrack
+
+LARGEST_BYTES = 2**31
+"""Files that are larger hold more than one recording, or are damaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """Sound that lies in the file of the motion."""
+
+    audio: NDArray[np.float32]
+    """[S] mono, -1..1."""
+    sample_rate: int
+    """Hz."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was read of one recording."""
+
+    motion: Motion
+    """In the file's own layout and at its own rate."""
+    sound: Sound | None = None
+    phones: PhoneTrack | None = None
+    words: tuple[Segment, ...] = ()
+    text: str = ""
+    remarks: tuple[str, ...] = field(default=())
+
+
+def require_file(path: Path) -> None:
+    """FacesynthError for a file that is missing, empty or too large to be one recording."""
+    if not path.is_file():
+        raise FacesynthError(f"{path}: no such file")
+    size = path.stat().st_size
+    if not 0 < size <= LARGEST_BYTES:
+        what = "is empty (0 bytes)" if not size else f"is larger than {LARGEST_BYTES / 1e9:.1f} GB"
+        raise FacesynthError(f"{path} {what}; export the recording again")
+
+
+def motion_of_arrays(
+    path: Path,
+    frames: NDArray[np.floating],
+    fps: float,
+    layout: Layout,
+    head: NDArray[np.floating] | None = None,
+    eyes: NDArray[np.floating] | None = None,
+) -> Motion:
+    """A motion of what was read; what does not fit becomes an error that names the file."""
+    try:
+        motion = Motion(np.asarray(frames, np.float32), float(fps), layout, _single(head), _single(eyes))
+    except (ValueError, TypeError) as error:
+        raise FacesynthError(f"{path}: {error}") from None
+    if not len(motion) or np.isinf(motion.frames).any() or np.isnan(motion.frames).all():
+        raise FacesynthError(f"{path} holds no frames, only missing samples, or infinite values; export it again")
+    return motion
+
+
+def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
+    return None if signal is None else np.asarray(signal, np.float32)

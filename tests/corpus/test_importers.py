@@ -1,0 +1,266 @@
+import struct
+from contextlib import suppress
+
+import numpy as np
+import pytest
+import scipy.io
+from click.testing import CliRunner
+
+from facesynth.cli.corpus import corpus_group
+from facesynth.corpus import Corpus
+from facesynth.corpus.add import add
+from facesynth.corpus.importers.c3d import turned
+from facesynth.corpus.importers.convert import convert, read
+from facesynth.errors import FacesynthError
+from facesynth.motion.layout import Layout
+from facesynth.speech.audio import save_wav
+
+LAYOUT = Layout("markers", ("chin", "lip"), {"jaw": (0,), "mouth": (1,)})
+
+
+def hum(path, seconds=1.0):
+    save_wav(path, (0.2 * np.sin(np.arange(int(16000 * seconds)) * 0.1)).astype(np.float32), 16000)
+
+
+def write_c3d(path, points, fps=120.0, unit="mm", labels=None, sound=None, sound_rate=24000):
+    """Points [T, K, 3] with NaN for gaps, written by a library that is not the one that reads."""
+    ezc3d = pytest.importorskip("ezc3d")
+    count = points.shape[1]
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [fps]
+    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
+    file["parameters"]["POINT"]["LABELS"]["value"] = tuple(labels or [f"M{k:03d}" for k in range(count)])
+    file["data"]["points"] = np.ones((4, count, len(points)))
+    file["data"]["points"][:3] = points.transpose(2, 1, 0)
+    if sound is not None:
+        file["parameters"]["ANALOG"]["RATE"]["value"] = [float(sound_rate)]
+        file["parameters"]["ANALOG"]["LABELS"]["value"] = ("Audio 1",)
+        file["parameters"]["ANALOG"]["OFFSET"]["value"] = [0]
+        file["parameters"]["ANALOG"]["SCALE"]["value"] = [1.0]
+        file["data"]["analogs"] = sound[None, None, :]
+    file.write(str(path))
+    return path
+
+
+def livelink_text(frames=120, head=0.1):
+    from facesynth.corpus.importers.livelink import ANGLES, FIRST
+
+    names = ["EyeBlinkLeft", "EyeBlinkRight", "JawOpen"]
+    rows = [",".join([*FIRST, *names, *ANGLES])]
+    for t in range(frames):
+        weights = [0.25, 0.75, t / frames]
+        angles = [head, -0.2, 0.05, 0.3, -0.1, 0.0, 0.1, -0.3, 0.0]
+        cells = [f"{value:.10f}" for value in [*weights, *angles]]
+        rows.append(f"10:00:{t // 60:02d}:{t % 60:02d}.000,61," + ",".join(cells))
+    return "\n".join(rows) + "\n"
+
+
+def test_c3d_with_gaps_odd_units_and_109_markers(tmp_path):
+    pytest.importorskip("c3d")
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1, 1, (40, 109, 3)).astype(np.float32)
+    points[5:9, 3] = np.nan
+    points[:, 100] = np.nan
+    reading = read(write_c3d(tmp_path / "täke 1.c3d", points, unit="dm"))
+    assert reading.motion.fps == 120
+    assert len(reading.motion.layout.names) == 109
+    assert np.array_equal(np.isnan(reading.motion.points), np.isnan(points))
+    assert np.nanmax(np.abs(reading.motion.points - 100 * points)) < 2e-4
+    assert reading.sound is None
+
+
+def test_c3d_by_layout_with_other_axes_and_sound(tmp_path):
+    pytest.importorskip("c3d")
+    points = np.random.default_rng(1).uniform(-100, 100, (60, 3, 3)).astype(np.float32)
+    sound = np.sin(np.arange(60 * 200) * 0.05)
+    path = write_c3d(tmp_path / "a.c3d", points, labels=["lip", "nose", "chin"], sound=sound)
+    reading = read(path, LAYOUT, axes="x,z,-y")
+    assert reading.motion.layout == LAYOUT
+    assert np.abs(reading.motion.points[:, 0] - points[:, 2][:, [0, 2, 1]] * [1, 1, -1]).max() < 1e-4
+    assert "1 markers" in reading.remarks[0]
+    assert reading.sound.sample_rate == 24000
+    assert np.corrcoef(reading.sound.audio, sound)[0, 1] > 0.9999
+    with pytest.raises(FacesynthError, match="unknown marker 'brow'"):
+        read(path, Layout("markers", ("brow",)))
+    with pytest.raises(FacesynthError, match="in 'furlong'"):
+        read(write_c3d(tmp_path / "b.c3d", points, unit="furlong"))
+    for axes in ("x,y", "x,x,z", "a,b,c", ""):
+        with pytest.raises(FacesynthError, match="three different signed letters"):
+            turned(np.zeros((1, 1, 3)), axes)
+
+
+def test_livelink_gives_weights_head_and_eyes(tmp_path):
+    (tmp_path / "take.csv").write_text(livelink_text(), encoding="utf-8")
+    motion = read(tmp_path / "take.csv").motion
+    assert motion.layout.names == ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen")
+    assert motion.fps == pytest.approx(60)
+    assert np.allclose(motion.frames[:, 2], np.arange(120) / 120)
+    assert np.allclose(motion.eyes[:, 0], 0.5)
+    assert np.allclose(motion.eyes[:, 1:], [-0.2, 0.2])
+    assert motion.head[0, 1] < 0, "positive yaw turns to the performer's right"
+
+
+def test_livelink_without_sound_is_refused_for_speech(tmp_path):
+    (tmp_path / "take.csv").write_text(livelink_text(), encoding="utf-8")
+    report = convert([tmp_path / "take.csv"], tmp_path / "out")
+    assert report.converted == ("take",)
+    layout = read(tmp_path / "take.csv").motion.layout
+    corpus = Corpus.create(tmp_path / "c", performer="A", layout=layout, fps=60, emotions=["neutral"])
+    assert "no sound" in add(corpus, [tmp_path / "out" / "take.npz"]).refused["take"]
+
+
+def test_curves_with_a_list_of_names_become_a_corpus(tmp_path):
+    weights = np.random.default_rng(2).uniform(0, 1, (30, 4)).astype(np.float32)
+    source = tmp_path / "source"
+    source.mkdir()
+    np.savez(source / "take.npz", weights=weights, fps=30)
+    (source / "channels.txt").write_text("jaw_open\nlip_up\nlip_down\nsmile\n", encoding="utf-8")
+    hum(source / "take.wav")
+    (source / "take.lab").write_text("0.4 pau\n0.7 aa\n1.0 pau\n", encoding="utf-8")
+    run = CliRunner().invoke
+    made = run(corpus_group, ["convert", str(source), "-o", str(tmp_path / "out")])
+    assert made.exit_code == 0, made.output
+    args = ["new", str(tmp_path / "c"), "--performer", "A", "--layout", str(tmp_path / "out" / "layout.yaml"), "--fps", "30"]
+    assert run(corpus_group, args).exit_code == 0
+    files = [tmp_path / "out" / "take.npz", source / "take.wav", source / "take.lab"]
+    done = run(corpus_group, ["add", str(tmp_path / "c"), *map(str, files)])
+    assert "added 1" in done.output, done.output
+    utterance = Corpus.open(tmp_path / "c")["take"]
+    assert utterance.motion.layout.names == ("jaw_open", "lip_up", "lip_down", "smile")
+    assert np.array_equal(utterance.motion.frames, weights)
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat", "csv"])
+def test_any_table_with_a_layout(tmp_path, kind):
+    points = np.random.default_rng(3).uniform(-50, 50, (20, 2, 3))
+    path = tmp_path / f"a.{kind}"
+    if kind == "npz":
+        np.savez(path, data=points, rate=250)
+    elif kind == "mat":
+        scipy.io.savemat(path, {"Signal": points, "SRate": 250.0})
+    else:
+        header = "chin.x,chin.y,chin.z,lip.x,lip.y,lip.z"
+        np.savetxt(path, points.reshape(20, 6), delimiter=",", header=header, comments="", fmt="%.6f")
+    motion = read(path, LAYOUT, fps=250).motion
+    assert motion.fps == 250
+    assert np.abs(motion.points - points).max() < 1e-5
+
+
+def test_what_does_not_say_enough_says_so(tmp_path):
+    np.savez(tmp_path / "a.npz", weights=np.zeros((3, 2)))
+    with pytest.raises(FacesynthError, match="does not name its channels"):
+        read(tmp_path / "a.npz")
+    curves = Layout("curves", ("a", "b"))
+    with pytest.raises(FacesynthError, match="no rate"):
+        read(tmp_path / "a.npz", curves)
+    with pytest.raises(FacesynthError, match=r"\[T, 6\]"):
+        read(tmp_path / "a.npz", LAYOUT, fps=30)
+    (tmp_path / "a.txt").write_text("x")
+    with pytest.raises(FacesynthError, match="none of"):
+        read(tmp_path / "a.txt")
+
+
+def test_other_channels_than_the_first_are_refused_and_the_rest_converted(tmp_path):
+    for name, channels in (("a", "jawOpen\n"), ("b", "smile\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "channels.txt").write_text(channels)
+        np.savez(tmp_path / name / f"{name}.npz", weights=np.ones((4, 1)), fps=30)
+    (tmp_path / "a" / "hurt.npz").write_bytes(b"PK hurt")
+    report = convert([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+    assert report.converted == ("a",)
+    assert set(report.refused) == {"b.npz", "hurt.npz"}
+    assert "other channels" in report.refused["b.npz"]
+
+
+def hurt(content: bytes, trial: int, rng) -> bytes:
+    """The content cut off, or with bytes changed, or both."""
+    part = bytearray(content[: int(rng.integers(0, len(content)))] if trial % 3 else content)
+    for place in rng.integers(0, max(len(part), 1), int(rng.integers(0, 12))) if part else ():
+        part[place] = int(rng.integers(256))
+    return bytes(part)
+
+
+@pytest.fixture
+def whole_files(tmp_path):
+    """One good file of each kind, small."""
+    write_c3d(tmp_path / "c.c3d", np.ones((12, 2, 3)), labels=["lip", "chin"], sound=np.zeros(12 * 200))
+    points = np.random.default_rng(4).uniform(-50, 50, (12, 2, 3))
+    np.savez(tmp_path / "t.npz", frames=points, fps=60)
+    np.savez_compressed(tmp_path / "z.npz", frames=points, fps=60)
+    scipy.io.savemat(tmp_path / "t.mat", {"frames": points, "fps": 60.0}, do_compression=True)
+    header = "chin.x,chin.y,chin.z,lip.x,lip.y,lip.z"
+    np.savetxt(tmp_path / "t.csv", points.reshape(12, 6), delimiter=",", header=header, comments="")
+    (tmp_path / "l.csv").write_text(livelink_text(90), encoding="utf-8")
+    turns = {name: np.zeros((5, 3), np.float32) for name in ("jaw", "head", "neck", "left_eye", "right_eye")}
+    np.savez(tmp_path / "f.npz", fps=30, **turns)
+    return sorted(tmp_path.glob("*.*"))
+
+
+def fuzz(whole_files, tmp_path, trials):
+    rng = np.random.default_rng(11)
+    for path in whole_files:
+        assert len(read(path, None if path.stem in "lf" else LAYOUT, fps=60).motion) > 0
+        target = tmp_path / f"hurt{path.suffix}"
+        content = path.read_bytes()
+        for trial in range(trials):
+            target.write_bytes(hurt(content, trial, rng))
+            with suppress(FacesynthError):
+                read(target, None if path.stem in "lf" else LAYOUT, fps=60)
+
+
+def test_damaged_files_never_end_in_a_traceback(whole_files, tmp_path):
+    with np.errstate(all="ignore"):
+        fuzz(whole_files, tmp_path, 20)
+
+
+@pytest.mark.slow
+def test_five_hundred_damaged_files_of_each_kind(whole_files, tmp_path):
+    with np.errstate(all="ignore"):
+        fuzz(whole_files, tmp_path, 500)
+
+
+@pytest.mark.parametrize("content", [b"", b"no capture", b"\x02\x51" + bytes(600), b"\x02\x50" + bytes(600)])
+def test_what_is_no_c3d(tmp_path, content):
+    pytest.importorskip("c3d")
+    (tmp_path / "a.c3d").write_bytes(content)
+    with pytest.raises(FacesynthError, match=r"a\.c3d"):
+        read(tmp_path / "a.c3d")
+
+
+def test_a_c3d_that_is_cut_off(tmp_path):
+    pytest.importorskip("c3d")
+    whole = write_c3d(tmp_path / "a.c3d", np.ones((30, 4, 3), np.float32)).read_bytes()
+    for share in (0.2, 0.5, 0.9):
+        (tmp_path / "b.c3d").write_bytes(whole[: int(share * len(whole))])
+        with suppress(FacesynthError):
+            read(tmp_path / "b.c3d")
+    claims_much = bytearray(whole)
+    claims_much[6:10] = struct.pack("<HH", 1, 65535)
+    (tmp_path / "c.c3d").write_bytes(bytes(claims_much))
+    with suppress(FacesynthError):
+        read(tmp_path / "c.c3d")
+
+
+def test_real_takes(recordings, tmp_path):
+    facegood = convert([recordings("facegood")], tmp_path / "facegood")
+    assert len(facegood.converted) == 4
+    assert read(recordings("facegood") / "1114_2_01.npz").motion.frames.shape == (3295, 116)
+    scott = read(recordings("beat2_scott") / "2_scott_0_1_1_first45s.npz").motion
+    assert np.isfinite(scott.head).all()
+    assert len(scott) / scott.fps == pytest.approx(45)
+    take = read(recordings("livelink") / "MySlate_161_iPhone_cal.csv").motion
+    assert len(take.layout.names) == 52
+    assert take.eyes[:, 0].min() < 0.5, "somebody blinks"
+
+
+def test_real_articulography_comes_with_sound_phones_and_words(recordings, tmp_path):
+    report = convert([recordings("haskins_ema")], tmp_path / "ema")
+    assert len(report.converted) == 2
+    reading = read(recordings("haskins_ema") / "F01_B01_S01_R01_N.mat")
+    corpus = Corpus.create(tmp_path / "c", performer="F01", layout=reading.motion.layout, fps=100, emotions=["neutral"])
+    assert len(add(corpus, [tmp_path / "ema"]).added) == 2
+    utterance = corpus["F01_B01_S01_R01_N"]
+    assert utterance.speech.phones.labels[:4] == ("pau", "dh", "ah", "b")
+    assert utterance.speech.text == "The birch canoe slid on the smooth planks."
+    lips = utterance.motion.points[:, utterance.motion.layout.names.index("UL")] - utterance.motion.points[:, 4]
+    assert 10 < np.median(lips[:, 1]) < 45, "the upper lip is above the lower one"
