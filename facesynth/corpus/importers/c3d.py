@@ -81,6 +81,8 @@ def _opened(path: Path) -> _Content:
         raise FacesynthError(f"{path} is no C3D file, or is damaged ({' '.join(str(error).split())})") from None
     if any("end of file" in str(warning.message) for warning in said):
         raise FacesynthError(f"{path} is cut off: it states more frames than it holds; copy it again")
+    if not content.points.size:
+        raise FacesynthError(f"{path} holds no frames of markers; export it again")
     return content
 
 

@@ -1,0 +1,164 @@
+import json
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from facesynth.capture.kept_tracks import kept_track
+from facesynth.capture.landmarks import landmark_layout
+from facesynth.capture.models import MODELS, _kept
+from facesynth.capture.shape import neutral_shape
+from facesynth.cli.corpus import corpus_group
+from facesynth.corpus import Corpus
+from facesynth.corpus.add import add, find_recordings
+from facesynth.corpus.importers.video import corpus_from_video, motion_from_video
+from facesynth.corpus.transcripts import read_transcripts
+from facesynth.errors import FacesynthError
+from facesynth.motion.lips import lip_gap
+
+LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven please", "swbm3n": "set white by m three now"}
+
+
+@pytest.fixture
+def clips(recordings, tmp_path):
+    """Three clips of a real talker with what is said in them, and a file that is no video."""
+    if not all(_kept(name).is_file() for name in MODELS):
+        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    for name in LINES:
+        shutil.copy(recordings("grid_s26") / f"{name}.mpg", folder)
+    (folder / "broken.mp4").write_bytes(b"no video")
+    rows = [f"{name}.mpg,{text}" for name, text in LINES.items()]
+    (folder / "lines.csv").write_text("\n".join(["file,text", *rows]) + "\n", encoding="utf-8")
+    return folder
+
+
+def videos(clips):
+    return sorted(map(str, clips.glob("*.mp*g*")))
+
+
+def contents(path):
+    return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
+
+
+def run(*arguments):
+    result = CliRunner().invoke(corpus_group, list(map(str, arguments)))
+    if isinstance(result.exception, FacesynthError):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_clips_become_a_corpus_in_one_command(clips, tmp_path):
+    folder = tmp_path / "Actor 26"
+    out = run("add", folder, *videos(clips), clips / "broken.mp4", "--text-file", clips / "lines.csv", "--jobs", 1, "--json")
+    report = json.loads(out)
+    assert report["added"] == sorted(LINES)
+    assert list(report["refused"]) == ["broken"]
+    corpus = Corpus.open(folder)
+    assert (corpus.performer, corpus.fps, corpus.layout.channels) == ("Actor 26", 25, 1404)
+    assert "90 mm" in corpus.notes
+    utterance = corpus["bgbsza"]
+    assert utterance.speech.text == LINES["bgbsza"]
+    assert utterance.speech.phones.labels[1:4] == ("b", "ih", "n")
+    gap = lip_gap(utterance.motion)
+    assert gap.min() < 3
+    assert 6 < gap.max() < 25
+    assert utterance.motion.head is not None
+    assert utterance.motion.eyes is not None
+    again = run("add", folder, *videos(clips), "--jobs", 1)
+    assert "added 0, already there 3" in again
+
+
+def test_two_processes_give_the_same_bytes_as_one(clips, tmp_path):
+    texts = read_transcripts(clips / "lines.csv")
+    made = []
+    for jobs in (1, 2):
+        corpus = corpus_from_video(tmp_path / f"c{jobs}", videos(clips), {"performer": "A", "emotions": ["neutral"]}, jobs=jobs)
+        report = add(corpus, videos(clips), texts=texts, jobs=jobs)
+        assert (len(report.added), report.refused) == (3, {})
+        made.append(contents(corpus.path))
+    assert made[0] == made[1]
+
+
+def killed_and_repeated(clips, tmp_path, times, seed):
+    """Start the import `times` times, end each at a random moment, then let it run; compare with an undisturbed run."""
+    command = [sys.executable, "-c", "from facesynth.cli import main; main()", "corpus", "add"]
+    options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--jobs", "1", "--performer", "A"]
+    start = time.monotonic()
+    subprocess.run([*command, str(tmp_path / "whole"), *options], check=True, capture_output=True, timeout=120)
+    whole_s = time.monotonic() - start
+    rng = np.random.default_rng(seed)
+    for trial in range(times):
+        target = tmp_path / f"killed{trial // 5}"
+        process = subprocess.Popen([*command, str(target), *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            process.wait(timeout=float(rng.uniform(0.3, 1.1)) * whole_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if trial % 5 == 4 or trial == times - 1:
+            subprocess.run([*command, str(target), *options], check=True, capture_output=True, timeout=120)
+            left = {name: content for name, content in contents(target).items() if "/.part-" not in name and name[0] != "."}
+            assert left == {name: content for name, content in contents(tmp_path / "whole").items() if name[0] != "."}
+
+
+def test_killed_at_any_moment_and_run_again_gives_the_same_corpus(clips, tmp_path):
+    killed_and_repeated(clips, tmp_path, 5, seed=5)
+
+
+@pytest.mark.slow
+def test_killed_fifty_times_gives_the_same_corpus(clips, tmp_path):
+    killed_and_repeated(clips, tmp_path, 50, seed=6)
+
+
+def test_another_rate_is_resampled_and_another_layout_refused(clips):
+    from corpora import tiny_layout
+
+    clip = clips / "bgbsza.mpg"
+    layout = landmark_layout(neutral_shape([kept_track(clip)]))
+    motion, remarks = motion_from_video(clip, clip, layout, 60)
+    assert (motion.fps, len(motion)) == (60, 180)
+    assert remarks == ("resampled from 25 to 60 fps",)
+    with pytest.raises(FacesynthError, match="another layout"):
+        motion_from_video(clip, clip, tiny_layout(), 25)
+
+
+def test_a_video_is_sound_and_motion_unless_files_of_its_name_are(tmp_path):
+    for name in ("a.mp4", "b.mp4", "b.npz", "c.mov", "c.wav", "d.mp4", "d.avi"):
+        (tmp_path / name).touch()
+    found, refused = find_recordings([tmp_path])
+    assert {r.name: (r.sound.name, r.motion.name) for r in found} == {
+        "a": ("a.mp4", "a.mp4"),
+        "b": ("b.mp4", "b.npz"),
+        "c": ("c.wav", "c.mov"),
+    }
+    assert list(refused) == ["d"]
+
+
+def test_nothing_to_make_a_corpus_from_is_one_clear_error(tmp_path):
+    (tmp_path / "a.wav").touch()
+    with pytest.raises(FacesynthError, match="is no corpus yet, and there is no video"):
+        corpus_from_video(tmp_path / "c", [tmp_path / "a.wav"], {"performer": "A", "emotions": ["neutral"]})
+    (tmp_path / "a.mp4").write_bytes(b"x" * 100)
+    with pytest.raises(FacesynthError, match=r"a\.mp4"):
+        corpus_from_video(tmp_path / "c", [tmp_path / "a.mp4"], {"performer": "A", "emotions": ["neutral"]})
+    assert not (tmp_path / "c").exists()
+
+
+def test_transcripts_by_name(tmp_path):
+    table = tmp_path / "lines.csv"
+    table.write_text('id,note,text\nclip 1.MP4,,"Hello,  you."\nb.2,x,there\n', encoding="utf-8-sig")
+    assert read_transcripts(table) == {"clip 1": "Hello, you.", "b.2": "there"}
+    for content in ("", "a,b\n", "id\nx\n", "id,text\na,b,c\n", 'id,text\n"a'):
+        table.write_text(content, encoding="utf-8")
+        with pytest.raises(FacesynthError, match=r"lines\.csv"):
+            read_transcripts(table)
+    table.write_bytes(b"id,text\n\xff\xfe,b\n")
+    with pytest.raises(FacesynthError, match="UTF-8"):
+        read_transcripts(table)
