@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,12 +104,12 @@ def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     from facesynth.cache import cache_dir
     from facesynth.methods.registry import create, load
 
-    key = f"demo-efase-{__version__}-{corpus.provenance()['sha256'][:16]}-{seed}.safetensors"
-    path = cache_dir("models") / key
+    model = create("efase")
+    made_of = json.dumps([__version__, model.config, corpus.provenance()["sha256"], seed])
+    path = cache_dir("models") / f"demo-efase-{sha256(made_of.encode()).hexdigest()[:16]}.safetensors"
     if path.exists():
         return load(path), False
-    model = create("efase").fit(corpus, seed=seed)
-    model.save(path)
+    model.fit(corpus, seed=seed).save(path)
     return model, True
 
 
