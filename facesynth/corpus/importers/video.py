@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from facesynth.capture.clock import clock_between, on_clock
 from facesynth.capture.kept_tracks import kept_track
 from facesynth.capture.landmarks import OUTER_CORNERS_MM, landmark_layout
 from facesynth.capture.motion import motion_of
@@ -21,6 +22,7 @@ from facesynth.errors import FacesynthError
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 from facesynth.motion.resample import resample
+from facesynth.speech.audio import load_audio
 
 CALIBRATION_CLIPS = 12
 """The face at rest is measured on so many clips, taken evenly from all."""
@@ -64,6 +66,12 @@ def motion_from_video(
     if share < 1:
         remarks.append(f"no face is seen in {np.count_nonzero(~track.present)} of {len(track.present)} frames")
     motion = motion_of(track, layout)
+    if sound != video:
+        clock = clock_between(*load_audio(video), *load_audio(sound))
+        motion = on_clock(motion, clock)
+        remarks.append(
+            f"the separate sound is {clock.offset_s * 1000:+.0f} ms late, drifting {clock.drift * 1e6:+.0f} ppm; moved"
+        )
     if not np.isclose(track.fps, fps, rtol=1e-6):
         remarks.append(f"resampled from {track.fps:g} to {fps:g} fps")
         motion = resample(motion, fps)
