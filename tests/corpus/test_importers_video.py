@@ -19,6 +19,7 @@ from facesynth.corpus.importers.video import corpus_from_video, motion_from_vide
 from facesynth.corpus.transcripts import read_transcripts
 from facesynth.errors import FacesynthError
 from facesynth.motion.lips import lip_gap
+from facesynth.speech.audio import load_audio, save_wav
 
 LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven please", "swbm3n": "set white by m three now"}
 
@@ -139,6 +140,20 @@ def test_a_video_is_sound_and_motion_unless_files_of_its_name_are(tmp_path):
         "c": ("c.wav", "c.mov"),
     }
     assert list(refused) == ["d"]
+
+
+def test_sound_that_was_recorded_apart_is_laid_on_the_video(clips):
+    clip = clips / "bgbsza.mpg"
+    audio, rate = load_audio(clip)
+    noise = 0.003 * np.random.default_rng(0).standard_normal(len(audio) + rate // 5)
+    save_wav(clips / "bgbsza.wav", (np.r_[np.zeros(rate // 5), 0.5 * audio] + noise).astype(np.float32), rate)
+    layout = landmark_layout(neutral_shape([kept_track(clip)]))
+    own, _ = motion_from_video(clip, clip, layout, 25)
+    moved, remarks = motion_from_video(clip, clips / "bgbsza.wav", layout, 25)
+    assert "+200 ms" in remarks[0]
+    assert len(moved) == len(own) + 5
+    assert np.isnan(moved.frames[:5]).all()
+    assert np.abs(moved.frames[5:] - own.frames).max() < 0.05
 
 
 def test_nothing_to_make_a_corpus_from_is_one_clear_error(tmp_path):
