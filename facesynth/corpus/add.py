@@ -32,6 +32,8 @@ KINDS = {
     "emotions": frozenset({EMOTIONS}),
 }
 SINGLE = ("sound", "motion")
+BESIDE = frozenset({"layout.yaml", "channels.txt", "LICENSE", "README.md"})
+"""What lies in folders of recordings and is none."""
 
 Task = tuple[Corpus, Record, "Recording", int | None]
 """Arguments of `prepare`."""
@@ -211,10 +213,14 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
 
 def _listed(path: Path) -> list[Path]:
     if path.is_dir():
-        return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
+        return sorted(file for file in path.iterdir() if file.is_file() and not _is_no_recording(file))
     if not path.is_file():
         raise FacesynthError(f"{path}: no such file or folder")
     return [path]
+
+
+def _is_no_recording(file: Path) -> bool:
+    return file.name.startswith(".") or file.name in BESIDE
 
 
 def _name_and_kind(file: Path) -> tuple[str, str | None]:
@@ -252,7 +258,8 @@ def _fault(group: Mapping[str, list[Path]]) -> str:
     for kind in SINGLE:
         if kind not in group:
             have = " and ".join(file.name for files in group.values() for file in files)
-            return f"there is no {kind} file of this name beside {have}"
+            why = "; motion without sound teaches no speech" if kind == "sound" else ""
+            return f"there is no {kind} file of this name beside {have}{why}"
     for kind, files in group.items():
         if len(files) > 1:
             return f"there are {len(files)} files of {kind}: {', '.join(file.name for file in files)}; leave one"
