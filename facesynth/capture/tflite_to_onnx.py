@@ -25,7 +25,7 @@ _IMAGE = (0, 3, 1, 2)
 
 def to_onnx(model: bytes) -> bytes:
     """The ONNX model that computes the same as a TensorFlow Lite model of convolutions; its input is called `input`."""
-    import tflite  # type: ignore[import-untyped]
+    import tflite
 
     try:
         source = tflite.Model.GetRootAsModel(model, 0)

@@ -13,7 +13,6 @@ from facesynth.errors import FacesynthError
 VERBS = {
     "demo": ("facesynth.cli.demo:demo", "Built-in performer: corpus, training, speech, video."),
     "corpus": ("facesynth.cli.corpus:corpus_group", "Make, fill and check a performer's recordings."),
-    "fetch": ("facesynth.cli.fetch:fetch", "Fetch models that capture needs; nothing is fetched unasked."),
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
     "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
