@@ -7,6 +7,7 @@ installed.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import subprocess
 import sys
 import tempfile
@@ -79,6 +80,8 @@ def session(name: str) -> onnxruntime.InferenceSession:
     path = _kept(name)
     if not path.is_file():
         raise FacesynthError("the models that find faces are not here; fetch them once with `facesynth fetch landmarks`")
+    if importlib.util.find_spec("cv2") is None:
+        raise FacesynthError("capturing from video needs OpenCV; install `facesynth[capture]`")
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
