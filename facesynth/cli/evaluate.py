@@ -64,4 +64,6 @@ def evaluate(
     result = compare(candidates, train, test, seed=seed, predictions_dir=output / "predictions")
     for suffix, text in ((".md", result.markdown()), (".csv", result.csv()), (".json", result.json())):
         write_text(output / f"table{suffix}", text)
-    click.echo(result.json() if as_json else result.markdown(MAIN))
+    click.echo(
+        result.json() if as_json else result.markdown([c for c in MAIN if c in {column.name for column in result.columns}])
+    )
