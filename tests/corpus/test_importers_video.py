@@ -161,7 +161,7 @@ def test_nothing_to_make_a_corpus_from_is_one_clear_error(tmp_path):
     with pytest.raises(FacesynthError, match="is no corpus yet, and there is no video"):
         corpus_from_video(tmp_path / "c", [tmp_path / "a.wav"], {"performer": "A", "emotions": ["neutral"]})
     (tmp_path / "a.mp4").write_bytes(b"x" * 100)
-    with pytest.raises(FacesynthError, match=r"a\.mp4"):
+    with pytest.raises(FacesynthError, match=r"a\.mp4|facesynth fetch landmarks"):
         corpus_from_video(tmp_path / "c", [tmp_path / "a.mp4"], {"performer": "A", "emotions": ["neutral"]})
     assert not (tmp_path / "c").exists()
 
