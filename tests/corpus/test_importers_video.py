@@ -23,6 +23,8 @@ from facesynth.speech.audio import load_audio, save_wav
 
 LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven please", "swbm3n": "set white by m three now"}
 
+pytestmark = pytest.mark.slow  # films are followed face by face
+
 
 @pytest.fixture
 def clips(recordings, tmp_path):
