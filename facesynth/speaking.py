@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -91,9 +94,13 @@ def write_performance(path: str | Path, performance: Performance, rig: Rig, size
 
 
 def rendered(animation: FaceAnimation, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
-    """Pictures [h, w, 3] of the face, one for each frame."""
-    for k in track(range(len(animation)), "rendering"):
-        yield picture(animation, k, rig, renderer)
+    """Pictures [h, w, 3] of the face, one for each frame; the next two are drawn while one is encoded."""
+    frames, ahead = iter(range(len(animation))), deque[Future[NDArray[np.uint8]]]()
+    with ThreadPoolExecutor(2, "picture") as painters:
+        for _ in track(range(len(animation)), "rendering"):
+            for k in islice(frames, 3 - len(ahead)):
+                ahead.append(painters.submit(picture, animation, k, rig, renderer))
+            yield ahead.popleft().result()
 
 
 def picture(animation: FaceAnimation, k: int, rig: Rig, renderer: Renderer) -> NDArray[np.uint8]:

@@ -20,7 +20,7 @@ Field = NDArray[np.float64]
 
 _SKIN = np.array([0.545, 0.335, 0.245])
 _LIPS = np.array([0.43, 0.185, 0.155])
-_HAIR = np.array([0.030, 0.019, 0.013])
+HAIR = np.array([0.030, 0.019, 0.013])
 _SHIRT = np.array([0.040, 0.058, 0.088])
 _MOUTH = np.array([0.26, 0.070, 0.062])
 
@@ -42,7 +42,7 @@ def paint_skin(corner_mm: NDArray[np.float32], corner_uv: NDArray[np.float32], m
     colour = _mix(colour, _LIPS * lines[..., None], 0.88 * lips)
     gloss = _gloss(place, lips)
     bare = 1 - scalp(place)
-    colour, gloss = _mix(colour, _HAIR, 1 - bare), gloss * (0.25 + 0.75 * bare)
+    colour, gloss = _mix(colour, HAIR, 1 - bare), gloss * (0.25 + 0.75 * bare)
     inside = step(0.3, 0.9, inner)
     colour, gloss = _mix(colour, _MOUTH, inside), gloss + (0.55 - gloss) * inside
     colour, gloss = _dressed(place, colour, gloss)
@@ -123,7 +123,7 @@ def _skin(place: Field, lids: Field, lips: Field) -> Field:
     colour = colour * (1 - lids[..., None] * [0.10, 0.20, 0.20])
     colour = colour * (1 - _spots(place)[..., None] * [0.35, 0.48, 0.55])
     colour = _mix(colour, colour * [0.80, 0.83, 0.87], _stubble(place) * (1 - lips))
-    return _mix(colour, _HAIR * 1.6, 0.55 * brow_shade(place) * _between(0.6, 1.2, noise(place * [1.6, 0.5, 1])))
+    return _mix(colour, HAIR * 1.6, 0.55 * brow_shade(place) * _between(0.6, 1.2, noise(place * [1.6, 0.5, 1])))
 
 
 def _stubble(place: Field) -> Field:

@@ -56,10 +56,9 @@ def baked_head(rig: Rig) -> Baked:
 def bake(rig: Rig) -> Baked:
     """Refine, paint, darken what sees little sky, and grow hair: about ten seconds."""
     refine, fine = catmull_clark(len(rig.rest_mm), rig.quads)
-    part = np.repeat(rig.quad_part, 4)
-    drawn_first = np.argsort(_MATERIALS[part], kind="stable")  # skin comes first: its quads number the patches of texture
-    fine, part = fine[drawn_first], part[drawn_first]
-    corner_uv = refine_corners(rig.corner_uv)[drawn_first]
+    order = _skin_first(rig)
+    fine, part = fine[order], np.repeat(rig.quad_part, 4)[order]
+    corner_uv = fine_corner_uv(rig)
     rest = np.ascontiguousarray(refine @ rig.rest_mm, np.float32)
     material = _MATERIALS[part]
     skin_quads = fine[material == SKIN]
@@ -77,6 +76,16 @@ def bake(rig: Rig) -> Baked:
     cap = (0.6 * scalp(rest.astype(np.float64)) * hair_volume_mm(rest.astype(np.float64))).astype(np.float32)
     cap[np.setdiff1d(np.arange(len(rest)), skin_quads)] = 0
     return Baked(refine, surface, grow_all(skin, _lash_cards(rig, fine, part)), cap)
+
+
+def fine_corner_uv(rig: Rig) -> NDArray[np.float32]:
+    """[F, 4, 2] texture coordinates of the corners of the fine quads, in the surface's order."""
+    return refine_corners(rig.corner_uv)[_skin_first(rig)]
+
+
+def _skin_first(rig: Rig) -> NDArray[np.int64]:
+    """[F] order of the fine quads: those of the skin number the patches of texture."""
+    return np.argsort(_MATERIALS[np.repeat(rig.quad_part, 4)], kind="stable")
 
 
 def _occlusion(rig: Rig, refine: sparse.csr_matrix, quads: NDArray[np.int32]) -> NDArray[np.float32]:

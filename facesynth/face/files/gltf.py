@@ -14,6 +14,7 @@ from facesynth.atomic import atomic_path
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf_buffer import Buffer
 from facesynth.face.files.mesh import TriangleMesh
+from facesynth.face.files.skin import skin_jpeg
 from facesynth.face.rig import PARTS, PIVOT_MM, Rig
 
 M_PER_MM = 1e-3  # glTF counts in metres
@@ -24,12 +25,13 @@ IRIS_MM, PUPIL_MM = 5.9, 2.1
 _SKIN, _TEETH, _TONGUE, _LASHES, _EYE = range(5)
 _MATERIAL_OF = {"skin": _SKIN, "upper_teeth": _TEETH, "lower_teeth": _TEETH, "tongue": _TONGUE}
 _COLOURS = {  # linear base colour, roughness
-    "skin": ((0.545, 0.335, 0.245), 0.55),
+    "skin": ((1.0, 1.0, 1.0), 0.55),
     "teeth": ((0.78, 0.74, 0.65), 0.3),
     "tongue": ((0.42, 0.13, 0.12), 0.4),
     "lashes": ((0.02, 0.015, 0.012), 0.9),
     "eyes": ((1.0, 1.0, 1.0), 0.12),
 }
+_TEXTURES = {"eyes": 0, "skin": 1}
 
 
 def write_glb(path: str | Path, animation: FaceAnimation, rig: Rig) -> None:
@@ -49,9 +51,12 @@ def write_glb(path: str | Path, animation: FaceAnimation, rig: Rig) -> None:
         skins=[gl.Skin(joints=[1, 2], skeleton=1, inverseBindMatrices=_inverse_binds(buffer))],
         materials=_materials(),
         animations=[_animation(buffer, animation, rig)],
-        images=[gl.Image(bufferView=buffer.view(_iris_png()), mimeType="image/png")],
+        images=[
+            gl.Image(bufferView=buffer.view(_iris_png()), mimeType="image/png"),
+            gl.Image(bufferView=buffer.view(skin_jpeg(rig)), mimeType="image/jpeg"),
+        ],
         samplers=[gl.Sampler(magFilter=gl.LINEAR, minFilter=gl.LINEAR, wrapS=gl.CLAMP_TO_EDGE, wrapT=gl.CLAMP_TO_EDGE)],
-        textures=[gl.Texture(source=0, sampler=0)],
+        textures=[gl.Texture(source=0, sampler=0), gl.Texture(source=1, sampler=0)],
     )
     document.accessors, document.bufferViews = buffer.accessors, buffer.views
     document.buffers = [gl.Buffer(byteLength=len(buffer.data))]
@@ -160,8 +165,8 @@ def _materials() -> list[gl.Material]:
         surface = gl.PbrMetallicRoughness(
             baseColorFactor=[*colour, 0.4 if hairs else 1.0], metallicFactor=0.0, roughnessFactor=roughness
         )
-        if name == "eyes":
-            surface.baseColorTexture = gl.TextureInfo(index=0)
+        if name in _TEXTURES:
+            surface.baseColorTexture = gl.TextureInfo(index=_TEXTURES[name])
         mode = gl.BLEND if hairs else gl.OPAQUE
         materials.append(
             gl.Material(name=name, pbrMetallicRoughness=surface, doubleSided=hairs, alphaMode=mode, alphaCutoff=None)

@@ -50,8 +50,8 @@ def check(glb):
         check_animation(glb, animation)
     for image in doc.get("images", []):
         view = doc["bufferViews"][image["bufferView"]]
-        assert glb.data[view["byteOffset"] :][:4] == b"\x89PNG"
-        assert image["mimeType"] == "image/png"
+        magic = {"image/png": b"\x89PNG", "image/jpeg": b"\xff\xd8\xff"}[image["mimeType"]]
+        assert glb.data[view["byteOffset"] :].startswith(magic)
     assert_no_empty_values(doc)
 
 
