@@ -18,6 +18,11 @@ OPEN_SHARE = 0.6
 
 CLOSING_S = 0.04
 """Lips take at least this long to close and to open, seconds."""
+LONGEST_CLOSING_S = 0.15
+"""… and at most this long, so that a stream knows how much to hold back."""
+
+Span = tuple[int, int]
+"""First frame of a p, b or m and one past its last."""
 
 
 def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
@@ -26,7 +31,7 @@ def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout:
     Each pair of facing lip points gets back the distance vector that it had, half from above and half from below;
     the other points of a lip follow by the mean of its corrections. Layouts without lip pairs stay as they are.
     """
-    if layout.dimension < 2 or not layout.lip_pairs:
+    if not has_lips(layout):
         return changed
     upper, lower = np.array(layout.lip_pairs).T
     points, old = layout.points(changed.copy()), layout.points(before)
@@ -36,15 +41,13 @@ def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout:
     return points.reshape(changed.shape)
 
 
-def close_at(
-    frames: NDArray[np.float64], layout: Layout, spans: Iterable[tuple[int, int]], gap: float, fps: float
-) -> NDArray[np.float64]:
+def close_at(frames: NDArray[np.float64], layout: Layout, spans: Iterable[Span], gap: float, fps: float) -> NDArray[np.float64]:
     """Frames [T, C] whose lips come as near to each other as `gap` within each span of frames.
 
     Blending and smoothing open the lips a little where a p, b or m shuts them. What is missing is added around the
-    narrowest frame, and fades within half the span or 40 ms, whichever is longer.
+    narrowest frame, and fades within half the span, but neither faster than 40 ms nor slower than 150 ms.
     """
-    if layout.dimension < 2 or not layout.lip_pairs:
+    if not has_lips(layout):
         return frames
     upper, lower = np.array(layout.lip_pairs).T
     points = layout.points(frames.copy())
@@ -52,7 +55,7 @@ def close_at(
         heights = (points[start:stop, upper, 1] - points[start:stop, lower, 1]).mean(axis=1)
         if not len(heights) or heights.min() <= gap:
             continue
-        middle, reach = start + int(heights.argmin()), max((stop - start) / 2, CLOSING_S * fps) + 1
+        middle, reach = start + int(heights.argmin()), closing_frames(start, stop, fps)
         near = np.arange(max(0, int(middle - reach)), min(len(points), int(middle + reach) + 1))
         amount = 0.5 + 0.5 * np.cos(np.pi * np.clip((near - middle) / reach, -1, 1))
         correction = np.zeros((len(near), len(upper), layout.dimension))
@@ -63,9 +66,62 @@ def close_at(
     return points.reshape(frames.shape)
 
 
-def narrowest_gaps(frames: NDArray[np.float32], layout: Layout, spans: Iterable[tuple[int, int]]) -> list[float]:
+def closing_frames(start: int, stop: int, fps: float) -> float:
+    """How many frames before and after its narrowest one a closure in a span touches."""
+    return float(np.clip((stop - start) / 2, CLOSING_S * fps, LONGEST_CLOSING_S * fps)) + 1
+
+
+def has_lips(layout: Layout) -> bool:
+    """Whether a layout says which points of the lips face each other."""
+    return layout.dimension > 1 and bool(layout.lip_pairs)
+
+
+class ClosingLips:
+    """`close_at` for frames that arrive in pieces, with the same result.
+
+    Tell it of each span before the frames that come 150 ms ahead of it; a frame is given back when no closure
+    can touch it any more.
+    """
+
+    def __init__(self, layout: Layout, gap: float, fps: float) -> None:
+        self.layout, self.gap, self.fps = layout, gap, fps
+        self._spans: list[Span] = []
+        self._held = np.zeros((0, layout.channels))
+        self._given = 0
+
+    def expect(self, start: int, stop: int) -> None:
+        """A p, b or m lies at these frames."""
+        self._spans.append((start, stop))
+
+    def push(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The next frames [n, C]; returns those [n', C] that are final, possibly none."""
+        self._held = np.concatenate([self._held, frames])
+        known = self._given + len(self._held)
+        while self._spans and self._spans[0][1] + closing_frames(*self._spans[0], self.fps) <= known:
+            self._close(self._spans.pop(0))
+        untouched = [start - int(closing_frames(start, stop, self.fps)) - 1 for start, stop in self._spans]
+        return self._give(min([known, *untouched]))
+
+    def finish(self) -> NDArray[np.float64]:
+        """The frames [n, C] that were held back."""
+        while self._spans:
+            self._close(self._spans.pop(0))
+        return self._give(self._given + len(self._held))
+
+    def _close(self, span: Span) -> None:
+        here = (max(0, span[0] - self._given), max(0, span[1] - self._given))
+        self._held = close_at(self._held, self.layout, [here], self.gap, self.fps)
+
+    def _give(self, stop: int) -> NDArray[np.float64]:
+        count = max(0, stop - self._given)
+        final, self._held = self._held[:count], self._held[count:]
+        self._given += count
+        return final
+
+
+def narrowest_gaps(frames: NDArray[np.float32], layout: Layout, spans: Iterable[Span]) -> list[float]:
     """The smallest opening of the inner lips in each span of frames [T, C] that has no missing samples."""
-    if layout.dimension < 2 or not layout.lip_pairs:
+    if not has_lips(layout):
         return []
     upper, lower = np.array(layout.lip_pairs).T
     points = layout.points(frames)
@@ -73,7 +129,7 @@ def narrowest_gaps(frames: NDArray[np.float32], layout: Layout, spans: Iterable[
     return [float(opening.min()) for opening in openings if np.isfinite(opening).all()]
 
 
-def bilabial_spans(phones: PhoneTrack, fps: float) -> list[tuple[int, int]]:
+def bilabial_spans(phones: PhoneTrack, fps: float) -> list[Span]:
     """First frame and one past the last of each p, b, m."""
     bounds = phones.frame_bounds(fps).tolist()
     return [(a, b) for label, a, b in zip(phones.labels, bounds[:-1], bounds[1:], strict=True) if label in BILABIALS]

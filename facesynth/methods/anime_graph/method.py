@@ -16,7 +16,7 @@ from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
-from facesynth.methods.anime_graph.closure import bilabial_spans, close_at, keep_shut, narrowest_gaps
+from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at, keep_shut, narrowest_gaps
 from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, VISEMES, Graph
@@ -36,7 +36,7 @@ from facesynth.methods.anime_graph.parallel import Take, emotion_pairs, take_of
 from facesynth.methods.anime_graph.plan import Plan, Wish, blend, explain, make_plan
 from facesynth.methods.anime_graph.search import Weights
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
-from facesynth.methods.anime_graph.streaming import Stream
+from facesynth.methods.anime_graph.streaming import FaceStream, Stream
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
@@ -227,34 +227,40 @@ class AnimeGraph(Method):
         moved, _ = blend(self.chooser, plan, self.fps)
         motion = self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps), speech)
         motion = self._with_intensity(motion, speech)
-        return self._mapped_to(motion, speech, to_emotion, to_intensity) if to_emotion is not None else motion
+        return motion if to_emotion is None else self.map_along(motion, speech, to_emotion, intensity=to_intensity)
 
-    def _mapped_to(self, motion: Motion, speech: Speech, target: str, intensity: float) -> Motion:
+    def map_along(self, motion: Motion, speech: Speech, target: str, *, intensity: float = 1.0) -> Motion:
+        """Any motion of the learned layout that goes with speech, from the speech's emotions to another one."""
+        if not 0 <= intensity <= 1:
+            raise FacesynthError(f"the intensity of a mapped emotion must lie from 0 (unchanged) to 1; got {intensity:g}")
+        self._map_number(target, target)
         for source in sorted(set(speech.emotions.labels) - {target}):
-            motion = self.map_emotion(motion, source, target, intensity=intensity * self._felt(speech, source))
+            motion = self.map_emotion(motion, source, target, intensity=intensity * self._felt(speech, source, motion))
         return motion
 
     def _with_intensity(self, motion: Motion, speech: Speech) -> Motion:
         """An emotion of intensity I is mapped towards neutral by 1 - I; where no map leads there, it stays whole."""
         track = speech.emotions
         for source in sorted(set(track.labels) & set(self.emotions) - {NEUTRAL}):
-            weak = self._felt(speech, source, 1 - track.intensities)
+            weak = self._felt(speech, source, motion, 1 - track.intensities)
             mapped = NEUTRAL in self.emotions and f"{source} {NEUTRAL}" not in self.facts["no_map"]
             if mapped and weak.max() > 0:
                 motion = self.map_emotion(motion, source, NEUTRAL, intensity=weak)
         return motion
 
-    def _felt(self, speech: Speech, emotion: str, amount: NDArray[np.float64] | float = 1.0) -> NDArray[np.float64]:
+    def _felt(
+        self, speech: Speech, emotion: str, motion: Motion, amount: NDArray[np.float64] | float = 1.0
+    ) -> NDArray[np.float64]:
         """[T] amount (of each interval of the emotion track) where the emotion is felt, 0 elsewhere; smooth over time."""
         from scipy.ndimage import gaussian_filter1d
 
-        track, count = speech.emotions, int(speech.phones.frame_bounds(self.fps)[-1])
+        track = speech.emotions
         felt = np.array([label == emotion for label in track.labels]) * amount
-        over_time = felt[track.index_at(np.arange(count) / self.fps)]
-        return gaussian_filter1d(over_time, EMOTION_CHANGES_S * self.fps, mode="nearest")
+        over_time = felt[track.index_at(motion.times_s)]
+        return gaussian_filter1d(over_time, EMOTION_CHANGES_S * motion.fps, mode="nearest")
 
-    def stream(self, wishes: Iterable[Wish], *, look_ahead: int = 4) -> Iterator[NDArray[np.float32]]:
-        """Frames [n, C] while phones arrive; `look_ahead` phones (the paper: 3 to 6) are waited for."""
+    def open_stream(self, *, look_ahead: int = 4) -> FaceStream:
+        """Something to push phones into and take frames from; `look_ahead` phones (the paper: 3 to 6) are waited for."""
         stream = Stream(
             self.chooser,
             self.weights,
@@ -263,9 +269,14 @@ class AnimeGraph(Method):
             fps=self.fps,
             look_ahead=look_ahead,
         )
+        return FaceStream(stream, self.components, ClosingLips(self.fitted_layout, self._closed_gap, self.fps))
+
+    def stream(self, wishes: Iterable[Wish], *, look_ahead: int = 4) -> Iterator[NDArray[np.float32]]:
+        """Frames [n, C] while phones arrive, as `open_stream` gives them."""
+        stream = self.open_stream(look_ahead=look_ahead)
         for wish in wishes:
-            yield self.components.decode_array(stream.push(wish)).astype(np.float32)
-        yield self.components.decode_array(stream.finish()).astype(np.float32)
+            yield stream.push(wish)
+        yield stream.finish()
 
     def plan(self, speech: Speech, *, look_ahead: int | None = None) -> Plan:
         """The path through the graph that expresses speech."""
@@ -309,7 +320,12 @@ class AnimeGraph(Method):
     def _motion(self, components: NDArray[np.float64], speech: Speech) -> Motion:
         """Components [T, D] as motion whose lips close at every p, b, m as they do in the recordings."""
         frames = self.components.decode_array(components)
-        if self.facts["closed_gap"] is not None:
-            spans = bilabial_spans(speech.phones, self.fps)
-            frames = close_at(frames, self.fitted_layout, spans, self.facts["closed_gap"], self.fps)
+        spans = bilabial_spans(speech.phones, self.fps)
+        frames = close_at(frames, self.fitted_layout, spans, self._closed_gap, self.fps)
         return Motion(frames.astype(np.float32), self.fps, self.fitted_layout)
+
+    @property
+    def _closed_gap(self) -> float:
+        """How near the lips come at a p, b or m, as recorded; infinite where the recordings do not show it."""
+        gap = self.facts["closed_gap"]
+        return np.inf if gap is None else float(gap)

@@ -39,6 +39,8 @@ class Plan:
     """[T] index of the chosen one among each phone's candidates."""
     cost: float
     """Eq. 2."""
+    optimum: float
+    """The least that any path costs."""
 
     @property
     def nodes(self) -> NDArray[np.int64]:
@@ -50,14 +52,20 @@ class Plan:
         """[T - 1] whether the step after each phone is a jump."""
         return jumps(self.steps, self.path)
 
+    @property
+    def extra_cost(self) -> float:
+        """Share by which the path costs more than the best one: what looking only some phones ahead loses."""
+        return self.cost / self.optimum - 1 if self.optimum > 0 else 0.0
+
     def summary(self) -> dict[str, Any]:
-        """Counts: phones, jumps, fallbacks of phone and of emotion; and the cost."""
+        """Counts: phones, jumps, fallbacks of phone and of emotion; the cost, and its share over the least possible."""
         phone_levels = Counter(c.phone_level for c in self.candidates)
         emotion_levels = Counter(c.emotion_level for c in self.candidates)
         return {
             "phones": len(self.path),
             "jumps": int(self.jumps.sum()),
             "cost": self.cost,
+            "extra_cost": self.extra_cost,
             "phone_fallbacks": {k: v for k, v in phone_levels.items() if k != "phone"},
             "emotion_fallbacks": {k: v for k, v in emotion_levels.items() if k != "emotion"},
         }
@@ -76,12 +84,12 @@ def make_plan(
 ) -> Plan:
     """The globally best path, or the one that a look-ahead of some phones finds."""
     candidates, steps = lay_steps(chooser, wishes, metric)
-    if look_ahead is None:
-        path, cost = best_path(steps, weights)
-    else:
+    path, optimum = best_path(steps, weights)
+    cost = optimum
+    if look_ahead is not None:
         path = look_ahead_path(steps, weights, look_ahead)
-        cost = path_cost(steps, path, weights)
-    return Plan(wishes, candidates, steps, path, cost)
+        cost = max(optimum, path_cost(steps, path, weights))  # the same path, added up in another order
+    return Plan(wishes, candidates, steps, path, cost, optimum)
 
 
 def make_piece(chooser: Chooser, wish: Wish, candidates: Candidates, chosen: int) -> Piece:

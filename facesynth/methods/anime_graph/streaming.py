@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 
 from facesynth.methods.anime_graph.assembly import Blender
 from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
+from facesynth.methods.anime_graph.closure import ClosingLips
+from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.lowpass import low_pass
 from facesynth.methods.anime_graph.plan import Wish, make_piece
-from facesynth.methods.anime_graph.search import LookAhead, Step, Weights, path_cost
+from facesynth.methods.anime_graph.search import LookAhead, Step, Weights, best_path, path_cost
+from facesynth.speech.phones import BILABIALS, PHONES
 
 FILTER_SETTLES_S = 0.25
 """The zero-phase filter needs to see this much of what follows a frame."""
@@ -65,6 +68,12 @@ class Stream:
         """Eq. 2 of the path so far; the global optimum costs this or less."""
         return path_cost(self.steps[: len(self.path)], np.array(self.path), self.weights)
 
+    @property
+    def extra_cost(self) -> float:
+        """Share by which the path so far costs more than the best one for the same phones."""
+        optimum = best_path(self.steps[: len(self.path)], self.weights)[1] if self.path else 0.0
+        return max(0.0, self.cost / optimum - 1) if optimum > 0 else 0.0
+
     def _settle(self, chosen: list[int]) -> None:
         for candidate in chosen:
             t = len(self.path)
@@ -83,3 +92,31 @@ class Stream:
         final = smooth[self._frames_out - start : stop - start]
         self._frames_out = stop
         return final
+
+
+class FaceStream:
+    """Phones in, frames of the face out: what `Stream` finds, decoded, with lips that close at p, b and m."""
+
+    def __init__(self, stream: Stream, components: FaceComponents, lips: ClosingLips) -> None:
+        self.components_stream, self.components, self.lips = stream, components, lips
+        self._frames_asked = 0
+
+    def push(self, wish: Wish) -> NDArray[np.float32]:
+        """The next phone; returns the frames [n, C] that became final, possibly none."""
+        start, self._frames_asked = self._frames_asked, self._frames_asked + wish.frames
+        if PHONES[wish.phone] in BILABIALS:
+            self.lips.expect(start, self._frames_asked)
+        return self._closed(self.components_stream.push(wish))
+
+    def finish(self) -> NDArray[np.float32]:
+        """The frames [n, C] that were held back."""
+        closed = self._closed(self.components_stream.finish())
+        return np.concatenate([closed, self.lips.finish().astype(np.float32)])
+
+    @property
+    def extra_cost(self) -> float:
+        """Share by which the path costs more than the best one: what looking only some phones ahead loses."""
+        return self.components_stream.extra_cost
+
+    def _closed(self, components: NDArray[np.float64]) -> NDArray[np.float32]:
+        return self.lips.push(self.components.decode_array(components)).astype(np.float32)
