@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -25,6 +25,7 @@ from facesynth.speech.speech import Speech
 
 if TYPE_CHECKING:
     from facesynth.face.render import Renderer
+    from facesynth.face.skin import MarkerSkin
 
 VIDEO_SUFFIXES = (".mp4",)
 OUTPUTS = (*VIDEO_SUFFIXES, *SUFFIXES)
@@ -39,6 +40,8 @@ class Performance:
     """What the method made, at its own rate."""
     animation: FaceAnimation
     """The same on the head, at the rate asked for."""
+    skin: MarkerSkin | None = None
+    """The skin as the markers move it, in place of the weights, where that was asked for."""
 
 
 @dataclass(frozen=True)
@@ -49,20 +52,38 @@ class Stage:
     head_gain: float = 1.0
     eyes_gain: float = 1.0
     seed: int = 0
+    deform: str = "shapes"
+    """What moves the skin in pictures: `shapes` (the solved weights), or the markers by `distance` or by `regions`."""
 
 
-def perform(method: Method, speech: Speech, rig: Rig, stage: Stage, options: Mapping[str, Any] | None = None) -> Performance:
-    """Synthesise and put on the head; `options` go to the method.
+def perform(
+    method: Method,
+    speech: Speech,
+    rig: Rig,
+    stage: Stage,
+    options: Mapping[str, Any] | None = None,
+    change: Callable[[Motion], Motion] | None = None,
+) -> Performance:
+    """Synthesise and put on the head; `options` go to the method, whose motion `change` may change.
 
     A method that makes no head motion gets a quiet sway with nods where the voice is loud.
     """
     motion = method.synthesize(speech, seed=stage.seed, **(options or {}))
+    motion = change(motion) if change else motion
     lively = motion
     if motion.head is None:
         lively = replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), stage.seed))
     gains = {"head_gain": stage.head_gain, "eyes_gain": stage.eyes_gain}
-    animation = animate(lively, rig, seed=stage.seed, phones=speech.phones, **gains)
-    return Performance(speech, motion, animation.resampled(stage.fps))
+    animation = animate(lively, rig, seed=stage.seed, phones=speech.phones, **gains).resampled(stage.fps)
+    return Performance(speech, motion, animation, _skin(motion, animation, rig, stage))
+
+
+def _skin(motion: Motion, animation: FaceAnimation, rig: Rig, stage: Stage) -> MarkerSkin | None:
+    if stage.deform == "shapes":
+        return None
+    from facesynth.face.skin import marker_skin
+
+    return marker_skin(stage.deform, rig, motion, animation)
 
 
 def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
@@ -89,17 +110,22 @@ def write_performance(path: str | Path, performance: Performance, rig: Rig, size
     from facesynth.face.render import Renderer
     from facesynth.face.video import write_video
 
-    frames = rendered(performance.animation, rig, Renderer(rig, size))
+    frames = rendered(performance, rig, Renderer(rig, size))
     write_video(path, frames, performance.animation.fps, performance.speech.audio, performance.speech.sample_rate)
 
 
-def rendered(animation: FaceAnimation, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
+def rendered(performance: Performance, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
     """Pictures [h, w, 3] of the face, one for each frame; the next two are drawn while one is encoded."""
+    animation, skin = performance.animation, performance.skin
+
+    def draw(k: int) -> NDArray[np.uint8]:
+        return renderer.render(skin.vertices(k)) if skin else picture(animation, k, rig, renderer)
+
     frames, ahead = iter(range(len(animation))), deque[Future[NDArray[np.uint8]]]()
     with ThreadPoolExecutor(2, "picture") as painters:
         for _ in track(range(len(animation)), "rendering"):
             for k in islice(frames, 3 - len(ahead)):
-                ahead.append(painters.submit(picture, animation, k, rig, renderer))
+                ahead.append(painters.submit(draw, k))
             yield ahead.popleft().result()
 
 

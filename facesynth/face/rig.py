@@ -98,7 +98,12 @@ def load_head() -> Rig:
 
 
 def pose(
-    rig: Rig, weights: ArrayLike, head: ArrayLike | None = None, gaze: ArrayLike | None = None, tongue_up: float = 0.0
+    rig: Rig,
+    weights: ArrayLike,
+    head: ArrayLike | None = None,
+    gaze: ArrayLike | None = None,
+    tongue_up: float = 0.0,
+    skin_mm: ArrayLike | None = None,
 ) -> NDArray[np.float32]:
     """Vertices [V, 3] in mm of one frame.
 
@@ -108,6 +113,7 @@ def pose(
     head : [6] rotation vector (rad) and translation (mm) about `PIVOT_MM`; None is at rest
     gaze : [2] rad to the performer's left and up; replaces the eyeLook weights. None follows those weights
     tongue_up : 0..1, lifts the tip of the tongue, for which ARKit has no shape
+    skin_mm : [V, 3] displacements that are added to those of the weights, before the head turns
     """
     values = _checked_weights(weights)[None]
     if gaze is not None:
@@ -116,6 +122,8 @@ def pose(
     vertices = rig.rest_mm + np.tensordot(values[0, active].astype(np.float32), rig.shapes_mm[active], 1)
     for (ball, centre), turn in zip(rig._eyeballs, eye_rotations(values[0]), strict=True):
         vertices[ball] = turn.apply(rig.rest_mm[ball] - centre) + centre
+    if skin_mm is not None:
+        vertices += np.asarray(skin_mm, np.float32)
     if tongue_up:
         _lift_tongue(rig, vertices, tongue_up)
     return vertices if head is None else _follow_head(vertices[None], rig.head_weight, np.asarray(head)[None])[0]
