@@ -76,6 +76,9 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--consent", default="", help="Who agreed to what; the corpus' own otherwise.")
 @click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
 @click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
+@click.option("--points", is_flag=True, help="Follow salient points of the lower face, for a model that shows the real face.")
+@click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px; it is found otherwise.")
+@click.option("--mask", type=FILE, help="With --points: PNG of the first picture's size, the lower face in white.")
 @click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
 @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes at once; all cores otherwise.")
 @as_json
@@ -90,6 +93,9 @@ def add(
     utterance_id: str | None,
     list_file: Path | None,
     face: int | None,
+    points: bool,
+    box: str | None,
+    mask: Path | None,
     performer: str | None,
     jobs: int,
     as_json: bool,
@@ -113,9 +119,13 @@ def add(
         read_records(list_file) if list_file else None,
         read_transcripts(text_file) if is_table and text_file else None,
     )
-    corpus = (
-        Corpus.open(folder) if (folder / "corpus.yaml").exists() else _from_video(folder, files, performer, face, jobs, about)
-    )
+    if (folder / "corpus.yaml").exists():
+        corpus = Corpus.open(folder)
+        _require_points(corpus, points)
+    elif points or box or mask:
+        corpus = _from_points(folder, files, _header(folder, performer, about), box, mask, face)
+    else:
+        corpus = _from_video(folder, files, performer, face, jobs, about)
     report = add_recordings(
         corpus,
         files,
@@ -127,6 +137,7 @@ def add(
         face=face,
         jobs=jobs,
     )
+    _keep_videos(corpus, files, {*report.added, *report.unchanged}, {name: record.id for name, record in (listed or {}).items()})
     lines = [f"added {len(report.added)}, already there {len(report.unchanged)}, not usable {len(report.refused)}"]
     _show(as_json, asdict(report), [*lines, *_listing("not added", report.refused), *_remarks(report.remarks)])
     _leave_if_nothing(not report.added and not report.unchanged, report.refused, "no recording was added")
@@ -214,13 +225,59 @@ def _from_video(
     """A new corpus for the performer of videos."""
     from facesynth.corpus.importers.video import corpus_from_video
 
-    header = {
+    return corpus_from_video(folder, files, _header(folder, performer, about), face=face, jobs=jobs)
+
+
+def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> dict[str, Any]:
+    return {
         "performer": performer or folder.resolve().name,
         "emotions": list(dict.fromkeys([*EMOTIONS, about["emotion"]])),
         "licence": about["licence"],
         "consent": about["consent"],
     }
-    return corpus_from_video(folder, files, header, face=face, jobs=jobs)
+
+
+def _from_points(
+    folder: Path, files: tuple[Path, ...], header: Mapping[str, Any], box: str | None, mask: Path | None, face: int | None
+) -> Corpus:
+    """A new corpus of points followed in videos."""
+    from facesynth.capture.points.finding import read_mask
+    from facesynth.corpus.importers.points import Where, corpus_from_points
+
+    where = Where(_numbers(box) if box else None, read_mask(mask) if mask else None, face)
+    return corpus_from_points(folder, files, header, where)
+
+
+def _numbers(box: str) -> tuple[float, ...]:
+    from facesynth.errors import FacesynthError
+
+    try:
+        left, top, right, bottom = (float(number) for number in box.split(","))
+    except ValueError:
+        raise FacesynthError(f"--box wants LEFT,TOP,RIGHT,BOTTOM in pixels, such as 100,60,225,242; got {box!r}") from None
+    return left, top, right, bottom
+
+
+def _require_points(corpus: Corpus, points: bool) -> None:
+    from facesynth.errors import FacesynthError
+    from facesynth.motion.planar import is_tracked
+
+    if points and not is_tracked(corpus.layout):
+        raise FacesynthError(f"{corpus.path} is a corpus of {corpus.layout.kind}; followed points need a corpus of their own")
+
+
+def _keep_videos(corpus: Corpus, files: Iterable[Path], ids: set[str], listed: Mapping[str, str]) -> None:
+    """The pictures of followed points stay with the corpus: the face is drawn from them."""
+    from facesynth.motion.planar import is_tracked
+
+    if not is_tracked(corpus.layout):
+        return
+    from facesynth.corpus.add import VIDEO, find_recordings
+    from facesynth.corpus.importers.points import keep_videos
+
+    videos = {listed.get(r.name, r.name): r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
+    alone = len(ids) == len(videos) == 1
+    keep_videos(corpus, dict.fromkeys(ids, *videos.values()) if alone else {i: videos[i] for i in sorted(ids) if i in videos})
 
 
 def _read_layout(path: Path) -> Layout:

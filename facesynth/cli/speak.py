@@ -95,6 +95,14 @@ class Fps(click.ParamType):
 @click.option("--eyes", type=Gain(), default="1", show_default=True, help="off, or a factor on gaze.")
 @click.option("--size", default="1280x720", show_default=True, help="Of the video.")
 @click.option("--explain", type=click.Path(path_type=Path), help="Write why each phone got its node (JSON).")
+@click.option("--noise", type=click.FloatRange(min=0), help="lds: amount of random motion; 1 as recorded, 0 none.")
+@click.option(
+    "--pictures",
+    type=click.Choice(["coherent", "nearest"]),
+    default="coherent",
+    show_default=True,
+    help="Real face: recorded pictures that follow each other well, or simply the nearest.",
+)
 @click.option("--seed", default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: Any) -> None:
@@ -111,6 +119,7 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
         _require_batch(outputs, options)
     size = parse_size(options["size"])
     method = load(model)
+    options["face_of"] = model
     results = [_speak_one(method, path, outputs, size, options) for path in recordings]
     if as_json:
         click.echo(json.dumps(results if len(results) > 1 else results[0]))
@@ -119,6 +128,7 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
 def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
     from facesynth.atomic import write_text
     from facesynth.face.rig import load_head
+    from facesynth.motion.planar import is_tracked
     from facesynth.speaking import Stage, perform, write_performance
     from facesynth.speech.textgrid import write_textgrid
 
@@ -126,6 +136,8 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
     for warning in heard.warnings:
         click.echo(f"warning: {path.name}: {warning}", err=True)
     settings = _method_options(method, heard, options)
+    if is_tracked(method.fitted_layout):
+        return _show_likeness(method, heard, path, outputs, settings, options)
     rig = load_head()
     stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"])
     performance = perform(method, heard.speech, rig, stage, settings)
@@ -144,6 +156,36 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
     return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written}
 
 
+def _show_likeness(
+    method: Method, heard: Heard, path: Path, outputs: list[Path], settings: dict[str, Any], options: dict[str, Any]
+) -> dict[str, Any]:
+    """The speaker's real face, for a model of points followed in video; at the rate and size of the speaker's pictures."""
+    from facesynth.corpus.signals import write_motion
+    from facesynth.likeness import load_face, write_likeness
+
+    targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
+    for target in targets:
+        if target.suffix.lower() not in (".mp4", ".npz"):
+            raise FacesynthError(
+                f"a model of points in a picture has no head for {target.suffix}; write .mp4 (the real face) or .npz"
+            )
+    speaker = load_face(options["face_of"], method)
+    motion = method.synthesize(heard.speech, seed=options["seed"], **settings)
+    facts: dict[str, Any] = {"speech": str(path), "duration_s": heard.speech.duration_s, "written": list(map(str, targets))}
+    for target in targets:
+        if target.suffix.lower() == ".npz":
+            write_motion(target, motion)
+            continue
+        report = write_likeness(target, motion, heard.speech, speaker, options["pictures"])
+        facts |= {"real_time_factor": report.real_time_factor, "folded_triangles": report.folded_triangles, "jumps": report.jumps}
+        click.echo(
+            f"{target}: {heard.speech.duration_s:.2f} s at {speaker.fps:.5g} fps; real-time factor of the drawing"
+            f" {report.real_time_factor:.2f}, folded triangles {report.folded_triangles}, jumps between pictures {report.jumps}",
+            err=True,
+        )
+    return facts
+
+
 def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
     from facesynth.speech.hearing import hear
 
@@ -160,6 +202,10 @@ def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
 def _method_options(method: Method, heard: Heard, options: dict[str, Any]) -> dict[str, Any]:
     if options["constraints"] or options["explain"]:
         _as_efase(method)
+    if options["noise"] is not None:
+        if method.name != "lds":
+            raise FacesynthError(f"{method.name} draws no noise; --noise is for lds")
+        return {"noise": options["noise"]}
     if not options["constraints"]:
         return {}
     from facesynth.methods.efase.constraints import read_constraints

@@ -34,6 +34,7 @@ def train(
     """Train METHOD on CORPUS and write one model file."""
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
+    from facesynth.likeness import save_face
     from facesynth.methods.registry import create
 
     model = create(method, **{**(load_config(config) if config else {}), **parse_settings(settings)})
@@ -45,6 +46,7 @@ def train(
     seconds = time.perf_counter() - start
     path = output or Path(f"{method}.safetensors")
     model.save(path)
+    face = save_face(recordings, path)
     size_mb = path.stat().st_size / 1e6
     facts = {"model": str(path), "method": method, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
     if as_json:
@@ -52,4 +54,6 @@ def train(
         return
     kind = "synthetic performer" if recordings.synthetic else "performer"
     click.echo(f"{method} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
+    if face:
+        click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

@@ -15,6 +15,7 @@ from facesynth.corpus.signals import hash_signals
 from facesynth.corpus.workers import spread
 from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
+from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import load_audio
 from facesynth.speech.segments import Segment
 from facesynth.speech.speech import Speech
@@ -147,6 +148,10 @@ def prepare(corpus: Corpus, record: Record, recording: Recording, face: int | No
 def _motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Motion, tuple[str, ...]]:
     if recording.motion.suffix.lower() not in VIDEO:
         return load_motion(recording.motion, corpus.layout, corpus.fps)
+    if is_tracked(corpus.layout):
+        from facesynth.corpus.importers.points import motion_from_points
+
+        return motion_from_points(corpus.path, recording.motion, recording.sound, corpus.fps)
     from facesynth.corpus.importers.video import motion_from_video
 
     return motion_from_video(recording.motion, recording.sound, corpus.layout, corpus.fps, face)

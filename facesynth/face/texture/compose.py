@@ -14,13 +14,12 @@ from torch import Tensor
 
 from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import Mesh, ringed_mesh
-from facesynth.face.texture.shapes import HeadMaps
 from facesynth.face.texture.sources import coherent, nearest
-from facesynth.face.texture.speaker import Speaker
+from facesynth.face.texture.speaker import Speaker, within
 from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+from facesynth.motion.planar import HeadMaps
 
 BATCH = 4
-MARGIN_PX = 4
 LARGEST_GAIN = 1.3
 
 Choice = Literal["coherent", "nearest"]
@@ -57,7 +56,7 @@ class TexturedFace:
         self.speaker = speaker
         self.device = torch.device(device)
         self.mesh: Mesh = ringed_mesh(speaker.shapes.mean(axis=0))
-        self.height, self.width = speaker.pictures.shape[1:3]
+        self.height, self.width = speaker.backgrounds.shape[1:3]
         self._opacity = torch.from_numpy(self.mesh.opacity).float().to(self.device)
         self._looks = speaker.looks
 
@@ -68,7 +67,7 @@ class TexturedFace:
         report: Report,
         choice: Choice = "coherent",
     ) -> Iterator[NDArray[np.uint8]]:
-        """Pictures [H, W, 3] for shapes [T, K, 2] (head-fixed px) over the speaker's pictures number `background` [T]."""
+        """Pictures [H, W, 3] for shapes [T, K, 2] (head-fixed px) over the whole pictures number `background` [T]."""
         if len(shapes) != len(background):
             raise FacesynthError(f"every shape needs a background; got {len(shapes)} shapes and {len(background)} backgrounds")
         sources = self.choose(shapes, choice)
@@ -93,11 +92,11 @@ class TexturedFace:
     def _drawn(
         self, shapes: NDArray[np.float64], sources: NDArray[np.int64], background: NDArray[np.int64]
     ) -> tuple[NDArray[np.uint8], int]:
-        target = self._placed(shapes, background)
-        source = self._placed(self.speaker.shapes[sources], sources)
+        target = self._on_head(self.speaker.background_head.at(background), shapes)
+        source = self._on_head(self.speaker.head.at(sources), self.speaker.shapes[sources]) - self.speaker.corner
         folded = int(self.mesh.folded(target).sum())
-        left, top, right, bottom = self._window(target)
-        behind = self.speaker.pictures[background]
+        left, top, right, bottom = within(target, self.height, self.width)
+        behind = self.speaker.backgrounds[background]
         box = torch.from_numpy(behind[:, top:bottom, left:right]).to(self.device).permute(0, 3, 1, 2).float()
         pictures = torch.from_numpy(self.speaker.pictures[sources]).to(self.device).permute(0, 3, 1, 2).float()
         warp = PiecewiseAffineWarp(torch.from_numpy(self.mesh.triangles), bottom - top, right - left).to(self.device)
@@ -113,18 +112,9 @@ class TexturedFace:
         out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()
         return out, folded
 
-    def _placed(self, shapes: NDArray[np.float64], pictures: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Vertices [T, V, 2] px of head-fixed shapes on the heads of these pictures."""
-        head = HeadMaps(self.speaker.linear[pictures], self.speaker.shift[pictures])
+    def _on_head(self, head: HeadMaps, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices [T, V, 2] px of head-fixed shapes [T, K, 2] on heads in a picture."""
         return head.to_picture(self.mesh.vertices(shapes))
-
-    def _window(self, vertices: NDArray[np.float64]) -> tuple[int, int, int, int]:
-        """Left, top, right, bottom px of the part of the picture that changes."""
-        low = np.floor(vertices.min(axis=(0, 1))).astype(int) - MARGIN_PX
-        high = np.ceil(vertices.max(axis=(0, 1))).astype(int) + MARGIN_PX
-        left, top = np.clip(low, 0, [self.width - 2, self.height - 2])
-        right, bottom = np.clip(high, [left + 2, top + 2], [self.width, self.height])
-        return int(left), int(top), int(right), int(bottom)
 
 
 def matched(warped: Tensor, behind: Tensor, opacity: Tensor) -> Tensor:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -12,40 +11,57 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.errors import FacesynthError
-from facesynth.face.texture.shapes import HeadMaps, Shapes
+from facesynth.face.texture.mesh import ringed_mesh
+from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16
 """Side of the little grey picture of the lower face by which pictures are compared."""
+MARGIN_PX = 4
+"""Around the ring of the mesh, so that bilinear sampling always has neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
 class Speaker:
-    """N training pictures, clip after clip."""
+    """N cut-out training pictures, clip after clip, and M whole pictures to lay them over."""
 
     pictures: NDArray[np.uint8]
-    """[N, H, W, 3]"""
+    """[N, h, w, 3] the lower face, cut out of the whole pictures at one place."""
+    corner: NDArray[np.int64]
+    """[2] (x, y) px of that place's first pixel in the whole picture."""
     shapes: NDArray[np.float64]
     """[N, K, 2] px, head-fixed."""
     linear: NDArray[np.float64]
     """[N, 2, 2] and …"""
     shift: NDArray[np.float64]
-    """[N, 2] … the map from head-fixed to picture coordinates."""
+    """[N, 2] … the map from head-fixed to whole-picture coordinates."""
     clip_starts: NDArray[np.bool_]
     """[N] whether a clip begins."""
+    backgrounds: NDArray[np.uint8]
+    """[M, H, W, 3] whole pictures that follow each other."""
+    background_linear: NDArray[np.float64]
+    """[M, 2, 2] and …"""
+    background_shift: NDArray[np.float64]
+    """[M, 2] … where the head is in them."""
     fps: float
     """Hz, of the pictures."""
 
     @property
     def head(self) -> HeadMaps:
-        """Where the head was in each picture."""
+        """Where the head was in each training picture."""
         return HeadMaps(self.linear, self.shift)
+
+    @property
+    def background_head(self) -> HeadMaps:
+        """Where the head is in each whole picture."""
+        return HeadMaps(self.background_linear, self.background_shift)
 
     @property
     def looks(self) -> NDArray[np.float64]:
         """[N, 256] the lower face in grey, head-fixed, its mean brightness taken out; in units of full brightness."""
         low, high = self.shapes.mean(axis=0).min(axis=0), self.shapes.mean(axis=0).max(axis=0)
         grid = np.stack(np.meshgrid(*np.linspace(low, high, LOOK_PX).T), axis=-1).reshape(1, -1, 2)
-        at = np.round(self.head.to_picture(np.broadcast_to(grid, (len(self.shapes), *grid.shape[1:])))).astype(np.int64)
+        placed = self.head.to_picture(np.broadcast_to(grid, (len(self.shapes), *grid.shape[1:])))
+        at = np.round(placed - self.corner).astype(np.int64)
         height, width = self.pictures.shape[1:3]
         x, y = np.clip(at[:, :, 0], 0, width - 1), np.clip(at[:, :, 1], 0, height - 1)
         grey = self.pictures[np.arange(len(at))[:, None], y, x].mean(axis=2) / 255
@@ -60,23 +76,50 @@ class Speaker:
     def load(cls, path: str | Path) -> Speaker:
         """Read what `save` wrote; FacesynthError for anything else."""
         if not Path(path).is_file():
-            raise FacesynthError(f"{path}: no such file; make it from video of the speaker")
+            raise FacesynthError(f"{path}: no such file; it is made by `facesynth train` beside a model of followed points")
         try:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = {field.name: stored[field.name] for field in fields(cls)}
         except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
             raise FacesynthError(f"{path} holds no pictures of a speaker, or is damaged ({error})") from None
-        return cls(**{**arrays, "fps": float(arrays["fps"])})
+        speaker = cls(**{**arrays, "fps": float(arrays["fps"])})
+        fault = _fault(speaker)
+        if fault:
+            raise FacesynthError(f"{path} holds no pictures of a speaker, or is damaged ({fault})")
+        return speaker
 
 
-def speaker_of(clips: Sequence[NDArray[np.uint8]], shapes: Sequence[Shapes]) -> Speaker:
-    """From clips of pictures [T, H, W, 3] and their shapes."""
-    starts = np.concatenate([np.arange(len(clip)) == 0 for clip in clips])
-    return Speaker(
-        np.concatenate(list(clips)),
-        np.concatenate([shape.points for shape in shapes]),
-        np.concatenate([shape.head.linear for shape in shapes]),
-        np.concatenate([shape.head.shift for shape in shapes]),
-        starts,
-        shapes[0].fps,
-    )
+def lower_face_window(shapes: NDArray[np.float64], head: HeadMaps, height: int, width: int) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom px of the part of pictures [H, W] in which the mesh over shapes [N, K, 2] ever lies."""
+    mesh = ringed_mesh(shapes.mean(axis=0))
+    return within(head.to_picture(mesh.vertices(shapes)), height, width)
+
+
+def within(vertices: NDArray[np.float64], height: int, width: int) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom px of the part of a picture that vertices [T, V, 2] reach, with a margin."""
+    low = np.floor(vertices.min(axis=(0, 1))).astype(int) - MARGIN_PX
+    high = np.ceil(vertices.max(axis=(0, 1))).astype(int) + MARGIN_PX
+    left, top = np.clip(low, 0, [width - 2, height - 2]).tolist()
+    right, bottom = np.clip(high, [left + 2, top + 2], [width, height]).tolist()
+    return left, top, right, bottom
+
+
+def _fault(speaker: Speaker) -> str:
+    """Which array does not have the shape that the others ask for; empty where all do."""
+    count, points, backs = len(speaker.pictures), speaker.shapes.shape[1:2], len(speaker.backgrounds)
+    wanted = {
+        "pictures": (count, *speaker.pictures.shape[1:3], 3),
+        "corner": (2,),
+        "shapes": (count, *points, 2),
+        "linear": (count, 2, 2),
+        "shift": (count, 2),
+        "clip_starts": (count,),
+        "backgrounds": (backs, *speaker.backgrounds.shape[1:3], 3),
+        "background_linear": (backs, 2, 2),
+        "background_shift": (backs, 2),
+    }
+    for name, shape in wanted.items():
+        array = getattr(speaker, name)
+        if array.shape != shape or not array.size or not np.isfinite(array).all():
+            return f"{name} has shape {array.shape}, or is not finite"
+    return ""

@@ -2,86 +2,57 @@
 
 import numpy as np
 import pytest
-import torch
+from chewing import BOX, HEIGHT, WIDTH, Chewing, drawn, skin
 
+from facesynth.capture.points.footage import Footage, read_footage, refuse_cuts, steady
+from facesynth.capture.points.reference import Reference
+from facesynth.capture.points.region import FaceRegion
+from facesynth.capture.points.shapes import outliers
+from facesynth.capture.points.tracking import corners, drift, follow_clip, neighbours_mean
 from facesynth.errors import FacesynthError
-from facesynth.face.texture.footage import Footage, read_footage, refuse_cuts, steady
-from facesynth.face.texture.region import FaceRegion
-from facesynth.face.texture.shapes import picture_points, shapes_of
-from facesynth.face.texture.tracking import corners, drift, neighbours_mean, track_clips
-from facesynth.face.texture.warp import sample
 from facesynth.face.video import write_video
+from facesynth.motion.planar import picture_points
 
 cv2 = pytest.importorskip("cv2")
-HEIGHT, WIDTH = 120, 160
-BOX = (40, 10, 120, 110)
 
 
 @pytest.fixture(scope="module")
 def texture():
-    rng = np.random.default_rng(0)
-    picture = cv2.GaussianBlur(rng.uniform(0, 255, (HEIGHT, WIDTH)).astype(np.float32), (0, 0), 1.6)
-    return (255 * (picture - picture.min()) / np.ptp(picture)).astype(np.float32)
-
-
-def drawn(texture, motion):
-    """[T, H, W] the texture with motion(t, x, y) px, the displacement of the point that is at (x, y) at t = 0."""
-    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
-    frames = []
-    for t in range(motion.length):
-        back = np.stack([x, y], axis=-1)
-        for _ in range(8):  # the point that comes to lie here: a fixed point, since the motion is gentle
-            back = np.stack([x, y], axis=-1) - motion(t, back[..., 0], back[..., 1])
-        offset = torch.from_numpy(back - np.stack([x, y], axis=-1)).float()[None]
-        frames.append(sample(torch.from_numpy(texture)[None, None], offset)[0, 0].numpy())
-    return np.stack(frames).round().clip(0, 255).astype(np.uint8)
-
-
-class Chewing:
-    """The head wanders and turns; below the middle, the face moves down and up by 4 px."""
-
-    def __init__(self, length, phase=0.0):
-        self.length, self.phase = length, phase
-
-    def head(self, t):
-        return 0.04 * np.sin(0.2 * t + self.phase), np.array(
-            [3 * np.sin(0.15 * t + self.phase), 2 * np.sin(0.1 * t + self.phase)]
-        )
-
-    def face(self, t, x, y):
-        opening = 4 * np.sin(0.4 * t) ** 2
-        return np.stack([0 * x, opening / (1 + np.exp(-(y - 85) / 6))], axis=-1)
-
-    def __call__(self, t, x, y):
-        angle, shift = self.head(t)
-        moved = np.stack([x, y], axis=-1) + self.face(t, x, y) - np.array([80, 60])
-        turned = moved @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        return turned + np.array([80, 60]) + shift - np.stack([x, y], axis=-1)
+    return skin(0)
 
 
 @pytest.fixture(scope="module")
 def chewed(texture):
     motions = [Chewing(40), Chewing(25, phase=0.0)]
-    region = FaceRegion.from_box(BOX, HEIGHT, WIDTH)
-    return motions, track_clips([drawn(texture, motion) for motion in motions], region, 60)
+    clips = [filmed(drawn(texture, motion)) for motion in motions]
+    return motions, clips, Reference.choose(clips, FaceRegion.from_box(BOX, HEIGHT, WIDTH), 60)
+
+
+def filmed(grey, fps=25.0):
+    """Footage of grey pictures [T, H, W]."""
+    return Footage(np.repeat(grey[..., None], 3, axis=-1), fps, False)
 
 
 def test_points_follow_the_motion(chewed):
-    motions, tracks = chewed
-    for motion, clip in zip(motions, tracks.clips, strict=True):
-        start = tracks.reference
+    motions, clips, reference = chewed
+    for motion, clip in zip(motions, clips, strict=True):
+        start = reference.points
+        path = follow_clip(clip.frames[..., 0], reference.picture, start)
         wanted = np.stack([start + motion(t, start[:, 0], start[:, 1]) for t in range(motion.length)])
-        error = np.linalg.norm(clip - wanted, axis=-1)
+        error = np.linalg.norm(path - wanted, axis=-1)
         assert np.nanmedian(error) < 0.15
         assert np.nanquantile(error, 0.95) < 0.6
-    assert tracks.lost_share < 0.05
-    assert tracks.lower >= 30
+        _, following = reference.find(clip)
+        assert following.lost_share < 0.05
+        assert following.drift.median_px < 0.3
+    assert reference.lower >= 30
 
 
 def test_shapes_keep_the_mouth_and_lose_the_head(chewed):
-    motions, tracks = chewed
-    start = tracks.reference[: tracks.lower]
-    for motion, shape in zip(motions, shapes_of(tracks, 25.0), strict=True):
+    motions, clips, reference = chewed
+    start = reference.points[: reference.lower]
+    for motion, clip in zip(motions, clips, strict=True):
+        shape, _ = reference.find(clip)
         wanted = np.stack([start + motion.face(t, start[:, 0], start[:, 1]) for t in range(motion.length)])
         assert np.median(np.linalg.norm(shape.points - wanted, axis=-1)) < 0.7
         back = shape.head.to_head(shape.head.to_picture(shape.points))
@@ -89,10 +60,44 @@ def test_shapes_keep_the_mouth_and_lose_the_head(chewed):
 
 
 def test_motion_and_back(chewed):
-    shape = shapes_of(chewed[1], 25.0)[0]
+    shape, _ = chewed[2].find(chewed[1][0])
     motion = shape.to_motion()
     assert motion.layout.unit == "px"
     np.testing.assert_allclose(picture_points(motion.frames), shape.points, atol=1e-3)
+
+
+def test_a_point_that_jumps_onto_something_else_is_an_outlier():
+    rng = np.random.default_rng(0)
+    reference = rng.uniform(0, 100, (40, 2))
+    mouth = 5 * np.sin(np.arange(30))[:, None, None] * np.where(reference[:, 1:] > 50, [0.0, 1.0], 0.0)
+    fixed = reference + mouth + rng.normal(scale=0.3, size=(30, 40, 2))
+    assert not outliers(reference, fixed).any()
+    fixed[12:15, 7] += [9, 5]
+    strayed = outliers(reference, fixed)
+    assert strayed[12:15, 7].all()
+    assert strayed.sum() == 3
+
+
+def test_saved_points_come_back_and_bad_files_do_not(chewed, tmp_path):
+    reference = chewed[2]
+    reference.save(tmp_path / "points.npz")
+    back = Reference.load(tmp_path / "points.npz")
+    assert np.array_equal(back.points, reference.points)
+    assert back.lower == reference.lower
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "points.npz").read_bytes()[:2000])
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    for name in ("cut.npz", "other.npz", "none.npz"):
+        with pytest.raises(FacesynthError, match=name):
+            Reference.load(tmp_path / name)
+
+
+def test_another_scene_or_another_camera_is_refused(chewed, texture):
+    reference = chewed[2]
+    other = np.ascontiguousarray(texture[::-1, ::-1]).astype(np.uint8)
+    with pytest.raises(FacesynthError, match="speaker's points are found"):
+        reference.find(filmed(np.repeat(other[None], 6, axis=0)))
+    with pytest.raises(FacesynthError, match="100×60 px, those of the first clip 160×120"):
+        reference.find(filmed(np.zeros((6, 60, 100), np.uint8)))
 
 
 def test_drift_of_a_still_picture_is_nothing(texture):
@@ -105,16 +110,15 @@ def test_drift_of_a_still_picture_is_nothing(texture):
 def test_a_covered_point_is_lost_and_found_again(texture):
     clip = drawn(texture, Chewing(30))
     clip[10:16, 60:100, 60:90] = 128
-    tracks = track_clips([clip], FaceRegion.from_box(BOX, HEIGHT, WIDTH), 60)
-    hidden = (
-        (tracks.reference[:, 0] > 68)
-        & (tracks.reference[:, 0] < 82)
-        & (tracks.reference[:, 1] > 70)
-        & (tracks.reference[:, 1] < 90)
-    )
-    assert np.isnan(tracks.clips[0][12, hidden, 0]).mean() > 0.5
-    assert np.isfinite(tracks.clips[0][25, hidden, 0]).mean() > 0.8
-    assert all(np.isfinite(shape.points).all() for shape in shapes_of(tracks, 25.0))
+    reference = Reference.choose([filmed(clip)], FaceRegion.from_box(BOX, HEIGHT, WIDTH), 60)
+    path = follow_clip(clip, reference.picture, reference.points)
+    x, y = reference.points.T
+    hidden = (x > 68) & (x < 82) & (y > 70) & (y < 90)
+    assert np.isnan(path[12, hidden, 0]).mean() > 0.5
+    assert np.isfinite(path[25, hidden, 0]).mean() > 0.8
+    shapes, following = reference.find(filmed(clip))
+    assert np.isfinite(shapes.points).all()
+    assert following.lost_share > 0
 
 
 def test_gaps_follow_their_neighbours():
@@ -126,7 +130,7 @@ def test_gaps_follow_their_neighbours():
 
 def test_a_blank_face_is_refused():
     with pytest.raises(FacesynthError, match="stand out"):
-        track_clips([np.full((5, HEIGHT, WIDTH), 90, np.uint8)], FaceRegion.from_box(BOX, HEIGHT, WIDTH))
+        Reference.choose([filmed(np.full((5, HEIGHT, WIDTH), 90, np.uint8))], FaceRegion.from_box(BOX, HEIGHT, WIDTH))
 
 
 @pytest.mark.parametrize("box", [(0, 0, 200, 100), (50, 50, 60, 60), (90, 10, 40, 110)])
@@ -171,7 +175,6 @@ def test_files_are_read_and_bad_ones_refused(texture, tmp_path):
     assert footage.frames.shape == (12, HEIGHT, WIDTH, 3)
     assert footage.fps == pytest.approx(30)
     assert not footage.resampled
-    assert footage.grey.shape == (12, HEIGHT, WIDTH)
     (tmp_path / "no.mp4").write_bytes(b"not a video at all")
     with pytest.raises(FacesynthError, match="cannot be read"):
         read_footage(tmp_path / "no.mp4")
@@ -181,5 +184,5 @@ def test_sound_alone_is_refused(tmp_path):
     import soundfile
 
     soundfile.write(tmp_path / "only.wav", np.zeros(8000), 16000)
-    with pytest.raises(FacesynthError, match="sound but no video"):
+    with pytest.raises(FacesynthError, match="no pictures in it"):
         read_footage(tmp_path / "only.wav")

@@ -1,4 +1,4 @@
-"""Salient points of the lower face, followed through clips of one speaker.
+"""Salient points of a picture, followed through clips of one speaker.
 
 Shi-Tomasi corners of the reference picture, Lucas-Kanade from picture to picture, and two safeguards. Each
 step is tracked back again, and a point that does not return is lost. And each position is refined against the
@@ -8,7 +8,6 @@ reference picture itself, where that still looks alike: errors of the steps do n
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.errors import FacesynthError
-from facesynth.face.texture.region import FaceRegion
-from facesynth.progress import track
 
 Grey = NDArray[np.uint8]
 Points = NDArray[np.float32]
@@ -27,26 +24,6 @@ RETURN_PX = 1.0
 """A point that comes back further from where it was is lost."""
 REFINED_PX = 2.0
 """Refinement against the reference moves a point by no more than this."""
-KEPT_SHARE = 0.6
-"""Points found in a smaller share of all frames are given up."""
-FEWEST = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Tracks:
-    """K points of the lower face and J of the upper, through all clips."""
-
-    reference: Points
-    """[K + J, 2] (x, y) px in the reference picture, the lower face's K first."""
-    lower: int
-    """K"""
-    clips: tuple[Points, ...]
-    """For each clip [T, K + J, 2]; NaN where a point was lost."""
-
-    @property
-    def lost_share(self) -> float:
-        """Share of samples that were lost."""
-        return float(np.mean(np.concatenate([np.isnan(clip[:, :, 0]).ravel() for clip in self.clips])))
 
 
 @dataclass(frozen=True)
@@ -67,30 +44,6 @@ def corners(picture: Grey, mask: NDArray[np.bool_], count: int) -> Points:
     return np.zeros((0, 2), np.float32) if found is None else found.reshape(-1, 2).astype(np.float32)
 
 
-def track_clips(clips: Sequence[Grey], region: FaceRegion, count: int = 200) -> Tracks:
-    """Follow up to `count` lower-face points through clips [T, H, W] of one speaker and camera, from clip 0's first picture.
-
-    Each other clip is entered at the picture that is most like the reference and followed both ways from there.
-    """
-    reference = clips[0][0]
-    lower, upper = corners(reference, region.lower, count), corners(reference, region.upper, count // 4)
-    if len(lower) < FEWEST:
-        raise FacesynthError(
-            f"only {len(lower)} points stand out in the lower face, at least {FEWEST} are needed; check the box or the mask, "
-            "or give video that is sharper and better lit"
-        )
-    start = np.concatenate([lower, upper])
-    paths = [_follow_clip(clip, reference, start) for clip in track(clips, "following points")]
-    found = np.mean(np.concatenate([np.isfinite(path[:, :, 0]) for path in paths]), axis=0)
-    kept = found >= KEPT_SHARE
-    if kept[: len(lower)].sum() < FEWEST:
-        raise FacesynthError(
-            f"only {kept[: len(lower)].sum()} of {len(lower)} points could be followed through the clips; is it one speaker "
-            "and one camera, without cuts?"
-        )
-    return Tracks(start[kept], int(kept[: len(lower)].sum()), tuple(path[:, kept] for path in paths))
-
-
 def drift(clip: Grey, start: Points) -> Drift:
     """Follow points [K, 2] through a clip [T, H, W] step by step and back, without the reference's help."""
     there = np.concatenate([clip, clip[-2::-1]])
@@ -104,8 +57,11 @@ def drift(clip: Grey, start: Points) -> Drift:
     return Drift(float(np.median(distance[alive])), float(np.quantile(distance[alive], 0.9)), float(1 - alive.mean()))
 
 
-def _follow_clip(clip: Grey, reference: Grey, start: Points) -> Points:
-    """[T, K, 2] of one clip."""
+def follow_clip(clip: Grey, reference: Grey, start: Points) -> Points:
+    """[T, K, 2] points, at `start` [K, 2] in the reference picture [H, W], in every picture of a clip [T, H, W]; NaN where lost.
+
+    The clip is entered at the picture that is most like the reference and followed both ways from there.
+    """
     small = clip[:, ::4, ::4].astype(np.float32)
     likeness = np.abs(small - reference[::4, ::4].astype(np.float32)).mean(axis=(1, 2))
     entry = int(likeness.argmin())

@@ -1,4 +1,4 @@
-"""Tracks to shapes: gaps filled, the head's motion taken out."""
+"""Followed points to shapes: gaps filled, the head's motion taken out."""
 
 from __future__ import annotations
 
@@ -7,32 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.texture.tracking import Tracks, neighbours_mean
+from facesynth.capture.points.tracking import Points, neighbours_mean
 from facesynth.motion.gaps import fill_gaps
-from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
+from facesynth.motion.planar import HeadMaps, motion_frames, tracked_layout
 
 ROBUST_ROUNDS = 5
 FEWEST_STILL = 6
 """Points on the upper face that are enough to tell the head's motion."""
 
-
-@dataclass(frozen=True, eq=False)
-class HeadMaps:
-    """For each frame the map p -> p @ linear + shift from head-fixed to picture coordinates (rows are points)."""
-
-    linear: NDArray[np.float64]
-    """[T, 2, 2]"""
-    shift: NDArray[np.float64]
-    """[T, 2] px."""
-
-    def to_picture(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points [T, K, 2] px."""
-        return points @ self.linear + self.shift[:, None]
-
-    def to_head(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The inverse of `to_picture`."""
-        return (points - self.shift[:, None]) @ np.linalg.inv(self.linear)
+STRAYED_SPREADS = 8.0
+STRAYED_SHARE = 0.035
+"""Of the face's height or width, whichever is larger."""
+NEIGHBOURS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,41 +34,57 @@ class Shapes:
 
     def to_motion(self) -> Motion:
         """As motion of landmarks; a layout's y points up."""
-        count = self.points.shape[1]
-        layout = landmark_layout(count)
-        return Motion((self.points * [1, -1]).reshape(len(self.points), -1).astype(np.float32), self.fps, layout)
+        return Motion(motion_frames(self.points), self.fps, tracked_layout(self.points.shape[1]))
 
 
-def landmark_layout(count: int) -> Layout:
-    """Tracked points have no names of their own: p000, p001, …; all of them move with the mouth."""
-    return Layout("landmarks", tuple(f"p{i:03d}" for i in range(count)), {"mouth": tuple(range(count))})
+def mean_shape(reference: Points, lower: int, clips: list[Points], fps: float) -> NDArray[np.float64]:
+    """[K + J, 2] mean over clips [T, K + J, 2] of the head-fixed points, of which the first `lower` are the lower face."""
+    return np.mean([_steadied(reference, lower, clip, fps)[1].mean(axis=0) for clip in clips], axis=0)
 
 
-def picture_points(frames: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Frames [T, 2 K] of such a motion to points [T, K, 2] px, y down."""
-    return frames.reshape(len(frames), -1, 2).astype(np.float64) * [1, -1]
-
-
-def shapes_of(tracks: Tracks, fps: float) -> list[Shapes]:
-    """The shapes of every clip.
+def shapes_of(reference: Points, lower: int, everywhere: NDArray[np.float64], clip: Points, fps: float) -> Shapes:
+    """The shapes of one clip [T, K + J, 2].
 
     Frame by frame a similarity takes the head's motion out, told by the upper face where there are points on it. How the
     head was held differs from clip to clip, and foreshortens the face: an affine map for each clip brings its mean
-    shape to that of all clips.
+    shape to that of all clips, `everywhere` [K + J, 2].
     """
-    reference = tracks.reference.astype(np.float64)
-    wholes = [_filled(tracks, clip, fps) for clip in tracks.clips]
-    still = slice(tracks.lower, None) if len(reference) - tracks.lower >= FEWEST_STILL else slice(None)
-    heads = [_similarities(reference[still], whole[:, still]) for whole in wholes]
-    means = [head.to_head(whole).mean(axis=0) for head, whole in zip(heads, wholes, strict=True)]
-    held = [_held(head, np.mean(means, axis=0), mean) for head, mean in zip(heads, means, strict=True)]
-    return [Shapes(head.to_head(whole[:, : tracks.lower]), head, fps) for head, whole in zip(held, wholes, strict=True)]
+    head, fixed = _steadied(reference, lower, clip, fps)
+    held = _held(head, everywhere, fixed.mean(axis=0))
+    return Shapes(held.to_head(head.to_picture(fixed[:, :lower])), held, fps)
 
 
-def _filled(tracks: Tracks, clip: NDArray[np.float32], fps: float) -> NDArray[np.float64]:
+def _steadied(reference: Points, lower: int, clip: Points, fps: float) -> tuple[HeadMaps, NDArray[np.float64]]:
+    """Where the head was, and head-fixed points [T, K + J, 2] without gaps."""
+    start = reference.astype(np.float64)
+    still = slice(lower, None) if len(reference) - lower >= FEWEST_STILL else slice(None)
+    whole = _filled(reference, clip, fps)
+    head = _similarities(start[still], whole[:, still])
+    strayed = outliers(start, head.to_head(whole))
+    if strayed.any():
+        whole = _filled(reference, np.where(strayed[:, :, None], np.nan, clip).astype(np.float32), fps)
+        head = _similarities(start[still], whole[:, still])
+    return head, head.to_head(whole)
+
+
+def outliers(reference: NDArray[np.float64], fixed: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """[T, P] samples of head-fixed points [T, P, 2] that jumped onto something else.
+
+    They lie further from the point's own median place than it ever spreads, and do not move as the points around do.
+    """
+    from scipy.spatial import cKDTree
+
+    moved = fixed - reference
+    own = np.linalg.norm(moved - np.median(moved, axis=0), axis=2)
+    spread = np.maximum(np.median(own, axis=0), 0.5)
+    around = cKDTree(reference).query(reference, k=np.arange(2, min(NEIGHBOURS + 2, len(reference) + 1)))[1]
+    apart = np.linalg.norm(moved - np.median(moved[:, around], axis=2), axis=2)
+    return np.asarray((own > STRAYED_SPREADS * spread) & (apart > STRAYED_SHARE * np.ptp(reference, axis=0).max()))
+
+
+def _filled(reference: Points, clip: Points, fps: float) -> NDArray[np.float64]:
     """Points [T, K + J, 2] of a clip without gaps: short ones filled in time, long ones from the neighbours."""
     short = fill_gaps(clip.reshape(len(clip), -1), fps, 2)[0].reshape(clip.shape)
-    reference = tracks.reference
     return np.stack([reference + neighbours_mean(reference, frame - reference) for frame in short]).astype(np.float64)
 
 

@@ -1,0 +1,88 @@
+"""Shapes kept in the user's cache: following points is by far the slowest step, and depends on the video and the points alone."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from facesynth.atomic import atomic_path
+from facesynth.cache import cache_dir
+from facesynth.capture.points.footage import Footage, read_footage
+from facesynth.capture.points.reference import Following, Reference
+from facesynth.capture.points.shapes import Shapes
+from facesynth.capture.points.tracking import Drift
+from facesynth.errors import FacesynthError
+from facesynth.motion.planar import HeadMaps
+
+VERSION = 1
+"""Raised where following changes its results, so that old shapes are not used any more."""
+
+
+def kept_shapes(video: Path, reference: Reference) -> tuple[Shapes, Following, bool]:
+    """What `Reference.find` gives for a video, from the cache where it was found before; and whether its rate was evened out."""
+    kept = _place(video, reference)
+    found = _read(kept)
+    if found is None:
+        footage = read_footage(video)
+        shapes, following = _found(reference, footage, video)
+        found = shapes, following, footage.resampled
+        save_shapes(kept, *found)
+    return found
+
+
+def save_shapes(path: Path, shapes: Shapes, following: Following, resampled: bool) -> None:
+    """Write one .npz, atomically."""
+    drift = following.drift
+    figures = (following.lost_share, drift.median_px, drift.worst_tenth_px, drift.lost_share, float(resampled))
+    with atomic_path(path) as part, open(part, "wb") as file:
+        np.savez(
+            file,
+            points=shapes.points.astype(np.float32),
+            linear=shapes.head.linear,
+            shift=shapes.head.shift,
+            fps=shapes.fps,
+            figures=np.array(figures),
+        )
+
+
+def load_shapes(path: Path) -> Shapes:
+    """The shapes that `save_shapes` wrote; FacesynthError for anything else."""
+    found = _read(path)
+    if found is None:
+        raise FacesynthError(f"{path} is missing or damaged; add the video to the corpus again")
+    return found[0]
+
+
+def _found(reference: Reference, footage: Footage, video: Path) -> tuple[Shapes, Following]:
+    try:
+        return reference.find(footage)
+    except FacesynthError as error:
+        raise FacesynthError(f"{video}: {error}") from None
+
+
+def _place(video: Path, reference: Reference) -> Path:
+    if not video.is_file():
+        raise FacesynthError(f"{video}: no such file")
+    with open(video, "rb") as file:
+        content = hashlib.file_digest(file, "sha256").hexdigest()
+    made_by = hashlib.sha256(str(VERSION).encode())
+    for array in (reference.picture, reference.points, reference.mean):
+        made_by.update(np.ascontiguousarray(array).tobytes())
+    return cache_dir("tracks") / f"{content[:32]}-points-{made_by.hexdigest()[:16]}.npz"
+
+
+def _read(kept: Path) -> tuple[Shapes, Following, bool] | None:
+    """None where there is nothing, or something damaged."""
+    try:
+        with open(kept, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            points, fps = stored["points"].astype(np.float64), float(stored["fps"])
+            head = HeadMaps(stored["linear"].astype(np.float64), stored["shift"].astype(np.float64))
+            lost, median, worst, drifted, resampled = stored["figures"].tolist()
+    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile):
+        return None
+    if points.ndim != 3 or head.linear.shape != (len(points), 2, 2) or head.shift.shape != (len(points), 2):
+        return None
+    return Shapes(points, head, fps), Following(lost, Drift(median, worst, drifted)), bool(resampled)
