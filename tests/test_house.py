@@ -17,6 +17,7 @@ BELOW = {
     "methods": {"speech", "motion", "corpus", "face"},
     "performer": {"speech", "motion", "corpus", "face"},
     "evaluation": {"speech", "motion", "corpus", "face", "methods"},
+    "export": {"speech", "motion", "face", "methods"},
 }
 """What a room may import; the command line may import everything."""
 

@@ -17,6 +17,7 @@ VERBS = {
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
     "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
     "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
+    "export": ("facesynth.cli.export:export", "Write a model as ONNX graphs that run without torch."),
     "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),
 }
 

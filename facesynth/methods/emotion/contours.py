@@ -55,13 +55,13 @@ def contours(audio: Floats) -> Contours:
         raise FacesynthError(
             f"the sound is {what}; to detect an emotion, somebody must speak for at least {LEAST_FRAMES * 10} ms"
         )
-    framed = _frames(audio, WINDOW)
+    framed = frames(audio, WINDOW)
     power = np.square(np.abs(np.fft.rfft(framed * np.hamming(WINDOW), FFT)))
     level = np.log10(power.sum(axis=1) + 10 * SMALLEST_POWER)
     loud = np.flatnonzero(level > level.max() - QUIETER_DB / 10)
     kept = slice(loud[0], max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
     bands = np.log(power[kept] @ mel_bands() + SMALLEST_POWER)
-    pitch, periodicity = _pitch(_frames(audio, PITCH_WINDOW)[kept])
+    pitch, periodicity = _pitch(frames(audio, PITCH_WINDOW)[kept])
     voiced = periodicity > VOICED
     if voiced.sum() < 5:
         voiced = periodicity >= np.sort(periodicity)[-5]
@@ -76,7 +76,7 @@ def contours(audio: Floats) -> Contours:
     )
 
 
-def _frames(audio: Floats, length: int) -> Floats:
+def frames(audio: Floats, length: int) -> Floats:
     """[1 + S // HOP, length] frames centred on multiples of the hop."""
     padded = np.pad(audio, (length // 2, length))
     return np.lib.stride_tricks.sliding_window_view(padded, length)[::HOP][: 1 + len(audio) // HOP]

@@ -1,0 +1,107 @@
+"""An exported folder: nothing in it is used before its hash is found right."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth_runtime.errors import RuntimeInputError
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+MOST_BYTES = 1 << 24
+"""Of a manifest: a larger one is none."""
+KEYS = ("format", "method", "files", "graphs", "arrays", "settings", "latency", "emotions", "phones", "sha256")
+
+
+@dataclass(frozen=True, eq=False)
+class Folder:
+    """A verified folder."""
+
+    path: Path
+    manifest: dict[str, Any]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the method needs beside graphs and arrays."""
+        settings: dict[str, Any] = self.manifest["settings"]
+        return settings
+
+    def bytes_of(self, name: str) -> bytes:
+        """A file's content; RuntimeInputError where it is not what was exported."""
+        return checked_bytes(self.path / name, self.manifest["files"].get(name))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All arrays, with the types and shapes that the manifest states."""
+        path = self.path / "arrays.npz"
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                found = {name: stored[name] for name in self.manifest["arrays"]}
+        except (OSError, ValueError, KeyError) as error:
+            raise RuntimeInputError(f"{path}: cannot be read ({error}); export the model again") from None
+        for name, wanted in self.manifest["arrays"].items():
+            got = found[name]
+            if list(got.shape) != wanted["shape"] or str(got.dtype) != wanted["dtype"]:
+                raise RuntimeInputError(
+                    f"{path}: {name} is {got.dtype} {list(got.shape)}; the manifest wants {wanted['dtype']} {wanted['shape']}"
+                )
+        return found
+
+
+def open_folder(path: str | Path) -> Folder:
+    """Read the manifest and compare the hash of every file with it; RuntimeInputError names the file that is wrong."""
+    folder = Path(path)
+    manifest = _manifest(folder / MANIFEST)
+    for name, wanted in manifest["files"].items():
+        if Path(name).name != name:
+            raise RuntimeInputError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
+        checked_bytes(folder / name, wanted)
+    return Folder(folder, manifest)
+
+
+def checked_bytes(path: Path, wanted: Any) -> bytes:
+    """The content of a file whose size and sha256 are as wanted."""
+    if wanted is None:
+        raise RuntimeInputError(f"{path} is not listed in the manifest; export the model again")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RuntimeInputError(
+            f"{path}: {error.strerror or 'cannot be read'}; copy the whole folder, or export it again"
+        ) from None
+    if len(content) != wanted["bytes"]:
+        raise RuntimeInputError(
+            f"{path} has {len(content)} bytes; wanted {wanted['bytes']}: it is truncated or of another export"
+        )
+    if hashlib.sha256(content).hexdigest() != wanted["sha256"]:
+        raise RuntimeInputError(f"{path} does not have the hash that the manifest states: it was changed or is of another export")
+    return content
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise RuntimeInputError(f"{path} is too large for a manifest")
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RuntimeInputError(f"{path}: no such file; wanted a folder written by `facesynth export`") from None
+    except (OSError, ValueError) as error:
+        raise RuntimeInputError(f"{path} is damaged or no manifest ({error}); export the model again") from None
+    if not isinstance(manifest, dict) or manifest.get("written_by") != "facesynth" or not set(KEYS) <= set(manifest):
+        raise RuntimeInputError(f"{path} was not written by `facesynth export`")
+    if manifest["format"] != FORMAT:
+        raise RuntimeInputError(f"{path} has format {manifest['format']}; this runtime reads {FORMAT}: export the model again")
+    if _digest(manifest) != manifest["sha256"]:
+        raise RuntimeInputError(f"{path} was changed after it was written; export the model again")
+    return manifest
+
+
+def _digest(manifest: dict[str, Any]) -> str:
+    plain = {key: value for key, value in manifest.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

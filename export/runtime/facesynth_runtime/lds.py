@@ -1,0 +1,154 @@
+"""The linear dynamical system: sound in, frames out, at once or as the sound comes in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facesynth_runtime.errors import RuntimeInputError, reject_options
+from facesynth_runtime.folder import Folder
+from facesynth_runtime.graphs import Graph
+from facesynth_runtime.sound import resample
+from facesynth_runtime.tracks import Layout, Motion, checked_audio, checked_rate, frame_bounds
+
+MOST_FRAMES = 1024
+"""Frames computed at once: memory does not grow with the sound."""
+
+
+@dataclass(frozen=True, eq=False)
+class LdsState:
+    """All that a stream remembers between two pieces of sound."""
+
+    system: NDArray[np.float32]
+    """[1, n] state of the system before the next frame."""
+    heard: NDArray[np.float32]
+    """[S'] the sound that later frames need."""
+    first: int
+    """Which sample `heard` begins with, counted from the start of the sound."""
+    frames: int
+    """How many frames were given out."""
+    noise: float
+    random: Mapping[str, Any]
+    """State of the generator that draws the innovations."""
+
+    @property
+    def samples(self) -> int:
+        """How many samples were fed."""
+        return self.first + len(self.heard)
+
+
+class Lds:
+    """A folder exported from an `lds` model."""
+
+    def __init__(self, folder: Folder, threads: int) -> None:
+        manifest = folder.manifest
+        self.manifest = manifest
+        self.fps, self.rate = float(manifest["fps"]), int(manifest["sample_rate"])
+        self.layout, self.emotions = Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"])
+        self.settings = folder.settings
+        self.features, self.innovations, self.rollout = (
+            Graph(folder, g, threads) for g in ("features", "innovations", "rollout")
+        )
+
+    @property
+    def look_ahead_s(self) -> float:
+        """Frame t waits for the sound up to t / fps + this, seconds."""
+        return float(self.manifest["latency"]["look_ahead_s"])
+
+    def synthesize(self, speech: Any, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
+        """Motion for speech, of which only the sound counts; `noise` 1 as recorded, 0 the deterministic part alone."""
+        reject_options("lds", options, ("seed", "noise"))
+        count = max(1, int(frame_bounds(speech.phones.ends_s, self.fps)[-1]))
+        audio = resample(checked_audio(speech.audio), speech.sample_rate, self.rate)
+        state = replace(self.start(seed=seed, noise=noise), heard=audio)
+        frames, _ = self._frames(state, count)
+        return Motion(frames, self.fps, self.layout)
+
+    def start(self, *, seed: int = 0, noise: float = 1.0) -> LdsState:
+        """The state before the first sample: the noise has already run for some seconds."""
+        if not (np.isfinite(noise) and noise >= 0):
+            raise RuntimeInputError(f"noise is {noise}; wanted 0 (none), 1 (as recorded) or another number that is not negative")
+        rng = np.random.default_rng(seed)
+        count = round(self.settings["settling_s"] * self.fps)
+        no_sound = np.zeros((1, count, self.settings["features"]), np.float32)
+        rest = np.zeros((1, self.settings["states"]), np.float32)
+        _, system = self.rollout(features=no_sound, innovations=self._draw(rng, count, noise), state=rest)
+        return LdsState(system, np.zeros(0, np.float32), 0, 0, noise, rng.bit_generator.state)
+
+    def advance(self, state: LdsState, audio: ArrayLike) -> tuple[NDArray[np.float32], LdsState]:
+        """More sound [S] at the model's rate: the frames [t, C] that became final, possibly none, and the state after them."""
+        state = replace(state, heard=np.concatenate([state.heard, np.asarray(audio, np.float32)]))
+        ready = int(np.searchsorted(self._stops(state.frames, self._most(state)), state.samples, side="right"))
+        return self._frames(state, min(state.frames + ready, self._most(state)))
+
+    def finish(self, state: LdsState) -> tuple[NDArray[np.float32], LdsState]:
+        """The frames that were held back: after the end there is silence."""
+        return self._frames(state, max(1, self._most(state)))
+
+    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream:
+        """Sound in pieces of any size; `sample_rate` must be the model's."""
+        checked_rate(self.rate if sample_rate is None else sample_rate, self.rate)
+        return LdsStream(self, self.start(seed=seed, noise=noise))
+
+    def _most(self, state: LdsState) -> int:
+        """Frames of the sound so far."""
+        return round(state.samples / self.rate * self.fps)
+
+    def _starts(self, first: int, stop: int) -> NDArray[np.int64]:
+        """[stop - first] first sample of each frame's window, counted from the start of the sound."""
+        times_s = (np.arange(first, max(first, stop)) + 0.5) / self.fps + self.settings["lead_ms"] / 1000
+        return np.round(times_s * self.rate).astype(np.int64) - self.settings["window_samples"] // 2
+
+    def _stops(self, first: int, stop: int) -> NDArray[np.int64]:
+        return self._starts(first, stop) + self.settings["window_samples"]
+
+    def _frames(self, state: LdsState, stop: int) -> tuple[NDArray[np.float32], LdsState]:
+        """Frames from the state's next up to `stop`; sound that is not there is silence."""
+        done = [np.zeros((0, self.layout.dimension * len(self.layout.names)), np.float32)]
+        rng = np.random.default_rng(0)
+        rng.bit_generator.state = state.random
+        system = state.system
+        for first in range(state.frames, stop, MOST_FRAMES):
+            last = min(first + MOST_FRAMES, stop)
+            _, features = self.features(windows=self._windows(state, first, last))
+            frames, system = self.rollout(features=features, innovations=self._draw(rng, last - first, state.noise), state=system)
+            done.append(frames[0])
+        stop = max(stop, state.frames)
+        kept = int(np.clip(self._starts(stop, stop + 1)[0] - state.first, 0, len(state.heard)))
+        heard, first_kept = state.heard[kept:], state.first + kept
+        return np.concatenate(done), LdsState(system, heard, first_kept, stop, state.noise, rng.bit_generator.state)
+
+    def _windows(self, state: LdsState, first: int, stop: int) -> NDArray[np.float32]:
+        """[1, T, L]"""
+        length = self.settings["window_samples"]
+        starts = self._starts(first, stop) - state.first
+        before, after = max(0, -int(starts[0])), max(0, int(starts[-1]) + length - len(state.heard))
+        low = max(0, int(starts[0]))
+        sound = np.pad(state.heard[low : max(low, int(starts[-1]) + length)], (before, after))
+        return sound[(starts - starts[0])[:, None] + np.arange(length)][None]
+
+    def _draw(self, rng: np.random.Generator, count: int, noise: float) -> NDArray[np.float32]:
+        """[1, count, p]"""
+        uniform = rng.random((count, self.settings["components"])).astype(np.float32)[None]
+        return np.float32(noise) * self.innovations(uniform=uniform)[0]
+
+
+class LdsStream:
+    """`push` sound, get frames; `state` may be kept and given to another stream."""
+
+    def __init__(self, model: Lds, state: LdsState) -> None:
+        self.model, self.state = model, state
+
+    def push(self, audio: ArrayLike) -> NDArray[np.float32]:
+        """More sound [S]; the frames [t, C] that became final."""
+        frames, self.state = self.model.advance(self.state, audio)
+        return frames
+
+    def finish(self) -> NDArray[np.float32]:
+        """The frames that were held back."""
+        frames, self.state = self.model.finish(self.state)
+        return frames

@@ -1,0 +1,37 @@
+"""`facesynth export`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+
+@click.command("export")
+@click.argument("model", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option(
+    "--weights",
+    type=click.Choice(["float32", "float16", "int8"]),
+    default="float32",
+    show_default=True,
+    help="In what large constants are kept; fewer bits are smaller and less exact.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the manifest.")
+def export(model: Path, output: Path, weights: str, as_json: bool) -> None:
+    """Write MODEL as a folder that runs without torch: ONNX graphs, arrays and a manifest.
+
+    Every graph is compared with facesynth at two batch sizes and two lengths. facesynth-runtime runs the folder.
+    """
+    from facesynth.export.models import export_model
+
+    manifest = export_model(model, output, weights)  # type: ignore[arg-type]  # click checked the choice
+    if as_json:
+        click.echo(json.dumps(manifest))
+        return
+    for name, entry in manifest["graphs"].items():
+        difference = entry["parity"]["largest_relative_difference"]
+        click.echo(f"{name}: differs from facesynth by at most {difference:.2g} of the largest value", err=True)
+    total = sum(file["bytes"] for file in manifest["files"].values())
+    click.echo(f"{output}: {manifest['method']}, {total / 1e6:.2f} MB in {len(manifest['files'])} files", err=True)

@@ -1,0 +1,184 @@
+"""The audio features as graphs. All take sound that is already at their rate; sums are in float64 where logarithms follow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from facesynth.export.builder import Builder, power_spectrum
+from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.methods.emotion import contours
+from facesynth.speech.cepstrum import SMALLEST_MAGNITUDE, RealCepstrum
+from facesynth.speech.mel import FLOOR, LogMel
+from facesynth.speech.rasta_plp import ROUNDING_POWER, RastaPlp
+
+END = 2**62
+SAMPLES_EACH = 400
+"""Of test signals, for one unit of length."""
+
+
+def rasta_plp_graph(plp: RastaPlp) -> Graph:
+    """Sound [B, S] to RASTA-PLP cepstra [B, 1 + S // hop, order + 1]."""
+    b = Builder("rasta_plp")
+    audio = b.op("Cast", b.input("audio", "float32", ("batch", "samples")), to=11)
+    length, count = len(plp.window), plp.fft // 2 + 1
+    frames = _framed(b, audio, length, plp.hop, length // 2)
+    power = power_spectrum(b, frames, plp.window.numpy(), np.arange(count), plp.fft, "float64")
+    floor = ROUNDING_POWER * float(plp.window.square().sum())
+    energies = b.op("Log", b.op("MatMul", b.op("Add", power, b.constant(floor, "float64")), b.constant(plp.bands.numpy())))
+    filtered = _rasta(b, energies, plp.rasta.numpy())
+    auditory = b.op("Exp", b.op("Div", b.op("Add", filtered, b.constant(np.log(plp.loudness.numpy()))), b.constant(3.0)))
+    cepstra = b.op("Cast", _cepstra(b, auditory, plp), to=1)
+    port = Port("cepstra", "float32", ("batch", "frames", plp.order + 1), "none", plp.fps)
+    b.output(cepstra, port.name, port.dtype, port.shape)
+    return _of_sound(b, "RASTA-PLP cepstra, frame k centred on k / rate seconds", port, plp.sample_rate, plp)
+
+
+def cepstrum_graph(cepstrum: RealCepstrum, sample_rate: int) -> Graph:
+    """Sound [B, S] as one frame to the first coefficients of its real cepstrum [B, coefficients]."""
+    b = Builder("cepstrum")
+    audio = b.op("Cast", b.input("audio", "float32", ("batch", "samples")), to=11)
+    least, size = b.ints(2 * cepstrum.coefficients), b.shape_of(audio, 1)
+    long_enough = b.op("Max", least, size)
+    even = b.op("Add", long_enough, b.op("Mod", long_enough, b.ints(2)))
+    padded = b.op("Pad", audio, b.op("Concat", b.ints(0, 0, 0), b.op("Sub", even, size), axis=0))
+    spectrum = b.op("DFT", b.op("Unsqueeze", padded, b.ints(-1)), "", b.constant(1, "int64"), onesided=0)
+    power = b.op("ReduceSum", b.op("Mul", spectrum, spectrum), b.ints(-1), keepdims=1)
+    magnitude = b.op("Max", b.op("Sqrt", power), b.constant(SMALLEST_MAGNITUDE, "float64"))
+    back = b.op("DFT", b.op("Log", magnitude), "", b.constant(1, "int64"), inverse=1, onesided=0)
+    first = b.span(b.op("Squeeze", b.span(back, 2, 0, 1), b.ints(-1)), 1, 0, cepstrum.coefficients)
+    port = Port("cepstrum", "float64", ("batch", cepstrum.coefficients), "none")
+    b.output(first, port.name, port.dtype, port.shape)
+
+    def reference(arrays: Arrays) -> list[NDArray[Any]]:
+        return [cepstrum(torch.from_numpy(arrays["audio"]).double()).numpy()]
+
+    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", sample_rate)
+    return Graph("cepstrum", "real cepstrum of a whole sound", b.model(), (sound,), (port,), _short_sound, reference)
+
+
+def log_mel_graph(mel: LogMel) -> Graph:
+    """Sound [B, S] to log energies in mel bands [B, 1 + S // hop, bands]."""
+    b = Builder("log_mel")
+    audio = b.input("audio", "float32", ("batch", "samples"))
+    length = len(mel.window)
+    frames = _framed(b, audio, length, mel.hop, length // 2)
+    window = mel.window.numpy() / np.sqrt(float(mel.window.square().sum()))
+    power = power_spectrum(b, frames, window, np.arange(mel.fft // 2 + 1), mel.fft, "float32")
+    energies = b.op("Add", b.op("MatMul", power, b.constant(mel.filters.numpy())), b.constant(FLOOR, "float32"))
+    port = Port("log_mel", "float32", ("batch", "frames", mel.bands), "log energy", mel.fps)
+    b.output(b.op("Log", energies), port.name, port.dtype, port.shape)
+    return _of_sound(b, "natural logarithm of the energy in mel bands", port, mel.sample_rate, mel)
+
+
+def mel_cepstra_graph() -> Graph:
+    """Sound [B, S] at 16 kHz to power [B, T, 257], log mel bands [B, T, 40] and cepstra [B, T, 20], as emotions are read from."""
+    b = Builder("mel_cepstra")
+    audio = b.op("Cast", b.input("audio", "float32", ("batch", "samples")), to=11)
+    frames = _framed(b, audio, contours.WINDOW, contours.HOP, contours.WINDOW // 2)
+    spectrum = np.arange(contours.FFT // 2 + 1)
+    power = power_spectrum(b, frames, np.hamming(contours.WINDOW), spectrum, contours.FFT, "float64")
+    bands = b.op("Add", b.op("MatMul", power, b.constant(contours.mel_bands())), b.constant(contours.SMALLEST_POWER, "float64"))
+    bands = b.op("Log", bands)
+    cosines = contours.mel_cepstra(np.eye(contours.BANDS))
+    outputs = tuple(
+        Port(name, "float64", ("batch", "frames", width), unit, contours.RATE / contours.HOP)
+        for name, width, unit in (("power", 257, "power"), ("bands", contours.BANDS, "log power"), ("cepstra", 20, "none"))
+    )
+    for value, port in zip((power, bands, b.op("MatMul", bands, b.constant(cosines))), outputs, strict=True):
+        b.output(value, port.name, port.dtype, port.shape)
+
+    def reference(arrays: Arrays) -> list[NDArray[Any]]:
+        framed = np.stack([contours.frames(row.astype(np.float64), contours.WINDOW) for row in arrays["audio"]])
+        strength = np.square(np.abs(np.fft.rfft(framed * np.hamming(contours.WINDOW), contours.FFT)))
+        wanted = np.log(strength @ contours.mel_bands() + contours.SMALLEST_POWER)
+        return [strength, wanted, np.stack([contours.mel_cepstra(row) for row in wanted])]
+
+    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", contours.RATE)
+    return Graph("mel_cepstra", "mel bands and cepstra (MFCC)", b.model(), (sound,), outputs, _sound, reference)
+
+
+def _of_sound(b: Builder, about: str, port: Port, sample_rate: int, module: torch.nn.Module) -> Graph:
+    def reference(arrays: Arrays) -> list[NDArray[Any]]:
+        with torch.no_grad():
+            return [module(torch.from_numpy(arrays["audio"])).numpy()]
+
+    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", sample_rate)
+    return Graph(b.name, about, b.model(), (sound,), (port,), _sound, reference)
+
+
+def _sound(batch: int, length: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+    return {"audio": (0.1 * rng.standard_normal((batch, SAMPLES_EACH * length + 7))).astype(np.float32)}
+
+
+def _short_sound(batch: int, length: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+    return {"audio": (0.1 * rng.standard_normal((batch, 60 * length + 7))).astype(np.float32)}
+
+
+def _framed(b: Builder, audio: str, length: int, hop: int, before: int) -> str:
+    """[B, 1 + S // hop, length] windows that start at multiples of `hop`, `before` zeros standing before the sound."""
+    size = b.shape_of(audio, 1)
+    count = b.op("Add", b.op("Div", size, b.ints(hop)), b.ints(1))
+    padded = b.op("Pad", audio, b.ints(0, before, 0, length + hop))
+    one = b.op("Squeeze", count)
+    starts = b.op("Mul", b.op("Range", b.constant(0, "int64"), one, b.constant(1, "int64")), b.constant(hop, "int64"))
+    places = b.op("Add", b.op("Unsqueeze", starts, b.ints(1)), b.constant(np.arange(length)[None], "int64"))
+    return b.op("Gather", padded, places, axis=1)
+
+
+def _rasta(b: Builder, energies: str, response: NDArray[np.float64]) -> str:
+    """The filter along time [B, T, bands]: the first frame has lasted for ever. A scan over taps would be long: one over time.
+
+    H(z) = (0.2 + 0.1 z⁻¹ - 0.1 z⁻³ - 0.2 z⁻⁴) / (1 - pole z⁻¹). Its state is the last output and four inputs; at rest on a
+    constant the output is 0, since H(1) = 0.
+    """
+    pole = float(response[-1] / response[-2])
+    first = b.span(energies, 1, 0, 1)
+    held = b.op("Concat", first, first, first, first, energies, axis=1)
+    taps = (0.2, 0.1, 0.0, -0.1, -0.2)
+    size = b.shape_of(energies, 1)
+    parts = []
+    for k, tap in enumerate(taps):
+        if tap:
+            start = b.ints(4 - k)
+            parts.append(b.op("Mul", b.op("Slice", held, start, b.op("Add", start, size), b.ints(1)), b.constant(tap, "float64")))
+    driven = b.op("Transpose", b.op("Sum", *parts), perm=[1, 0, 2])
+    body = Builder("leak")
+    y, x = (body.input(name, "float64", ("batch", "bands")) for name in ("y", "x"))
+    leaked = body.op("Add", body.op("Mul", y, body.constant(pole, "float64")), x)
+    body.output(leaked, "y_next", "float64", ("batch", "bands"))
+    body.output(leaked, "y_here", "float64", ("batch", "bands"))
+    start = b.op("Mul", b.op("Squeeze", first, b.ints(1)), b.constant(0.0, "float64"))
+    _, filtered = b.ops("Scan", 2, start, driven, body=body.graph(), num_scan_inputs=1)
+    return b.op("Transpose", filtered, perm=[1, 0, 2])
+
+
+def _cepstra(b: Builder, auditory: str, plp: RastaPlp) -> str:
+    """Auditory spectrum to lifted cepstra: autocorrelation, Levinson-Durbin and the recursion to cepstra, written out."""
+    bands, p = plp.bands.shape[1], plp.order
+    inner = b.span(auditory, 2, 1, bands - 1)
+    spectrum = b.op("Concat", b.span(inner, 2, 0, 1), inner, b.span(inner, 2, bands - 3, bands - 2), axis=2)
+    mirrored = np.vstack([np.eye(bands), np.eye(bands)[1:-1][::-1]])
+    transform = np.cos(2 * np.pi * np.outer(np.arange(p + 1), np.arange(len(mirrored))) / len(mirrored)) / len(mirrored)
+    r = b.op("MatMul", spectrum, b.constant((transform @ mirrored).T))
+    lag = b.ops("Split", p + 1, r, axis=2, num_outputs=p + 1)
+    error, a = lag[0], [b.op("Div", lag[0], lag[0])]
+    for m in range(1, p + 1):
+        total = b.op("Sum", *(b.op("Mul", a[k], lag[m - k]) for k in range(m)))
+        reflection = b.op("Neg", b.op("Div", total, error))
+        a = [
+            a[0],
+            *(b.op("Add", a[k], b.op("Mul", reflection, a[m - k])) for k in range(1, m)),
+            b.op("Mul", reflection, a[0]),
+        ]
+        error = b.op("Sub", error, b.op("Mul", error, b.op("Mul", reflection, reflection)))
+    cepstra = [b.op("Log", error)]
+    for n in range(1, p + 1):
+        terms = [a[n]] + [b.op("Mul", b.op("Mul", cepstra[k], a[n - k]), b.constant(k / n, "float64")) for k in range(1, n)]
+        cepstra.append(b.op("Neg", b.op("Sum", *terms)))
+    lifter = np.arange(p + 1.0) ** plp.lift
+    lifter[0] = 1.0
+    return b.op("Mul", b.op("Concat", *cepstra, axis=2), b.constant(lifter))

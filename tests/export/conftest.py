@@ -1,0 +1,71 @@
+"""Small trained models and the folders that they are exported to; the runtime is taken from the checkout."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from corpora import RATE, tiny_corpus, tiny_utterances
+
+RUNTIME = Path(__file__).parents[2] / "export" / "runtime"
+sys.path.insert(0, str(RUNTIME))
+
+
+@pytest.fixture(scope="session")
+def runtime_folder() -> Path:
+    """The second distribution."""
+    return RUNTIME
+
+
+@pytest.fixture(scope="session")
+def small_corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("export") / "tiny", utterances=12, fps=60)
+
+
+@pytest.fixture(scope="session")
+def speeches():
+    """Sentences that the corpus does not have."""
+    return [speech for _, speech, _ in tiny_utterances(4, 60, seed=3)]
+
+
+@pytest.fixture(scope="session")
+def long_sound(speeches):
+    return np.concatenate([speech.audio for speech in speeches]), RATE
+
+
+@pytest.fixture(scope="session")
+def lds_file(small_corpus, tmp_path_factory):
+    from facesynth.methods.lds.method import LDS
+
+    quick = {"features": 4, "components": 4, "rows": 6, "lead_ms": 40, "deterministic_order": 2, "stochastic_order": 2}
+    path = tmp_path_factory.mktemp("models") / "lds.safetensors"
+    LDS(**quick).fit(small_corpus).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def emotion_file(small_corpus, tmp_path_factory):
+    from facesynth.methods.emotion.clips import clips_of_corpus
+    from facesynth.methods.emotion.detector import EmotionDetector
+
+    path = tmp_path_factory.mktemp("models") / "emotion.safetensors"
+    detector = EmotionDetector().fit(clips_of_corpus(small_corpus))
+    detector.provenance = small_corpus.provenance()
+    detector.save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def exported(tmp_path_factory):
+    """A function from a model file to its folder, exported once."""
+    from facesynth.export.models import export_model
+
+    known = {}
+
+    def folder_of(path, weights="float32"):
+        if (path, weights) not in known:
+            known[path, weights] = tmp_path_factory.mktemp("folders") / f"{path.stem}_{weights}"
+            export_model(path, known[path, weights], weights)
+        return known[path, weights]
+
+    return folder_of

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from facesynth_runtime import RuntimeInputError, load, resample
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facesynth.export.graph import difference
+from facesynth.methods.lds.method import LDS
+from facesynth.speech.audio import resample as facesynth_resample
+from facesynth.speech.speech import Speech
+
+
+@pytest.fixture(scope="module")
+def pair(lds_file, exported):
+    return LDS.load(lds_file), load(exported(lds_file))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0, 0.5])
+def test_the_runtime_moves_as_torch_does(pair, speeches, noise):
+    model, runtime = pair
+    for seed, speech in enumerate(speeches):
+        wanted = model.synthesize(speech, seed=seed, noise=noise)
+        got = runtime.synthesize(speech, seed=seed, noise=noise)
+        assert difference(got.frames, wanted.frames) < 1e-5
+        assert (got.fps, got.layout.names, len(got)) == (wanted.fps, wanted.layout.names, len(wanted))
+
+
+@pytest.mark.parametrize("rate", [8000, 11025, 22050, 44100, 48000])
+def test_sound_of_any_rate(pair, speeches, rate):
+    model, runtime = pair
+    speech = speeches[0]
+    other = Speech(facesynth_resample(speech.audio, 16000, rate), rate, speech.phones, speech.emotions)
+    assert difference(resample(other.audio, rate, 16000), facesynth_resample(other.audio, rate, 16000)) < 1e-6
+    assert difference(runtime.synthesize(other).frames, model.synthesize(other).frames) < 1e-5
+
+
+@settings(max_examples=15, deadline=None)
+@given(sizes=st.lists(st.integers(1, 6000), min_size=1, max_size=12), seed=st.integers(0, 99))
+def test_pieces_of_any_size_give_what_the_whole_gives(pair, speeches, sizes, seed):
+    _, runtime = pair
+    speech = speeches[seed % len(speeches)]
+    wanted = runtime.synthesize(speech, seed=seed).frames
+    stream, pieces, at = runtime.stream(seed=seed), [], 0
+    for size in [*sizes, len(speech.audio)]:
+        pieces.append(stream.push(speech.audio[at : at + size]))
+        at += size
+    got = np.concatenate([*pieces, stream.finish()])
+    assert abs(len(got) - len(wanted)) <= 1  # the phone track rounds seconds, the stream rounds samples
+    count = min(len(got), len(wanted))
+    assert difference(got[:count], wanted[:count]) < 1e-5
+
+
+def test_one_sample_at_a_time_and_the_stated_latency(pair, speeches):
+    _, runtime = pair
+    sound = speeches[0].audio[:3000]
+    stream, frames = runtime.stream(), []
+    for k in range(len(sound)):
+        for frame in stream.push(sound[k : k + 1]):
+            late_s = (k + 1) / 16000 - len(frames) / runtime.fps
+            assert late_s <= runtime.look_ahead_s + 1 / 16000
+            frames.append(frame)
+    rest = stream.finish()
+    assert len(frames) > 3
+    whole = runtime.stream()
+    again = np.concatenate([whole.push(sound), whole.finish()])
+    assert difference(np.concatenate([frames, rest]), again) < 1e-6
+
+
+def test_a_state_is_kept_and_taken_up_again(pair, speeches):
+    _, runtime = pair
+    sound = speeches[1].audio
+    stream = runtime.stream(seed=4)
+    first = stream.push(sound[:5000])
+    kept = stream.state
+    second = stream.push(sound[5000:])
+    again, _ = runtime.advance(kept, sound[5000:])
+    assert np.array_equal(second, again)
+    assert len(first)
+
+
+def test_what_is_wrong_is_named(pair, speeches):
+    _, runtime = pair
+    with pytest.raises(RuntimeInputError, match="44100 Hz; wanted 16000 Hz"):
+        runtime.stream(sample_rate=44100)
+    with pytest.raises(RuntimeInputError, match="noise is -1"):
+        runtime.synthesize(speeches[0], noise=-1)
+    with pytest.raises(RuntimeInputError, match="look_ahead"):
+        runtime.synthesize(speeches[0], look_ahead=3)
+    with pytest.raises(RuntimeInputError, match=r"float32 \[1, 5, 3\]; wanted float32 \['batch', 'frames', 4\]"):
+        runtime.rollout(
+            features=np.zeros((1, 5, 3), np.float32),
+            innovations=np.zeros((1, 5, 4), np.float32),
+            state=np.zeros((1, 4), np.float32),
+        )
+    with pytest.raises(RuntimeInputError, match="innovations is float32"):
+        runtime.rollout(
+            features=np.zeros((1, 5, 4), np.float32),
+            innovations=np.zeros((1, 6, 4), np.float32),
+            state=np.zeros((1, 4), np.float32),
+        )
+    with pytest.raises(RuntimeInputError, match="state is nothing"):
+        runtime.rollout(features=np.zeros((1, 5, 4), np.float32), innovations=np.zeros((1, 5, 4), np.float32))
+
+
+def test_fewer_bits_are_smaller_and_the_harm_is_stated(lds_file, exported, pair, speeches):
+    exact = pair[1].synthesize(speeches[0], noise=0.0).frames
+    moved = np.abs(exact - exact.mean(axis=0)).max()
+    sizes = {}
+    for weights, harm in (("float16", 0.02), ("int8", 0.3)):
+        folder = exported(lds_file, weights)
+        sizes[weights] = sum(path.stat().st_size for path in folder.iterdir())
+        smaller = load(folder)
+        assert 0 < smaller.manifest["graphs"]["features"]["parity"]["largest_relative_difference"] < 1
+        assert np.abs(smaller.synthesize(speeches[0], noise=0.0).frames - exact).max() < harm * moved
+    full = sum(path.stat().st_size for path in exported(lds_file).iterdir())
+    assert sizes["int8"] < 0.35 * full < sizes["float16"] < 0.6 * full
