@@ -111,13 +111,13 @@ def growth(nodes_of, query_of, penalty):
     sizes = []
     for size in SIZES:
         nodes = nodes_of(size)
-        if len(nodes) < size:
+        if sizes and len(nodes) < 1.5 * sizes[-1]:
             break
         weights = Weights(penalty * median_transition(nodes, Weights(1.0)))
         query = query_of(nodes)
         best, found = timed(lambda n=nodes, w=weights, q=query: search(build_index(n, w), q))
-        print(f"  N = {size:6d}: {best:.3f} s, phi computed {found.evaluated:.2%}")
-        sizes.append(size)
+        print(f"  N = {len(nodes):6d}: {best:.3f} s, phi computed {found.evaluated:.2%}", flush=True)
+        sizes.append(len(nodes))
         seconds.append(best)
     if len(sizes) > 1:
         exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]

@@ -85,14 +85,14 @@ def read_scene(path: Path, texels: int) -> Scene:
     """All triangles of a file with their morph targets; texels: points along a triangle's side at which colours are taken."""
     document = read_document(path)
     try:
-        return _scene(document, _Buffers(document, path), texels)
+        return _scene(document, Buffers(document, path), texels)
     except FacesynthError:
         raise
     except (AttributeError, IndexError, KeyError, TypeError, ValueError, ZeroDivisionError, MemoryError, RecursionError) as error:
         raise FacesynthError(f"{path} breaks the rules of glTF ({_line(error)}); export it again") from None
 
 
-class _Buffers:
+class Buffers:
     """The arrays behind a document's accessors."""
 
     def __init__(self, document: gl.GLTF2, path: Path) -> None:
@@ -125,28 +125,30 @@ class _Buffers:
         """The bytes of a buffer view, such as a picture."""
         found = self.document.bufferViews[view]
         start = found.byteOffset or 0
-        return self._blob(found.buffer)[start : start + found.byteLength]
+        return self.blob(found.buffer)[start : start + found.byteLength]
 
     def _view(self, index: int, offset: int, count: int, dtype: np.dtype[Any], width: int) -> NDArray[np.float64]:
         view = self.document.bufferViews[index]
         stride = view.byteStride or dtype.itemsize * width
         start = (view.byteOffset or 0) + offset
-        data = np.frombuffer(self._blob(view.buffer), np.uint8)
+        data = np.frombuffer(self.blob(view.buffer), np.uint8)
         if start + (count - 1) * stride + dtype.itemsize * width > len(data) or stride < dtype.itemsize * width or start < 0:
             raise FacesynthError(f"{self.path} is cut off: an array ends beyond the file; copy it again")
         rows = np.lib.stride_tricks.as_strided(data[start:], (count, dtype.itemsize * width), (stride, 1))
         return np.ascontiguousarray(rows).view(dtype.newbyteorder("<")).reshape(count, width).astype(np.float64)
 
-    def _blob(self, index: int) -> bytes:
+    def blob(self, index: int) -> bytes:
+        """All bytes of a buffer."""
         if index not in self._blobs:
             uri = self.document.buffers[index].uri
-            blob = self.document.binary_blob() if not uri else self._from_uri(uri)
+            blob = self.document.binary_blob() if not uri else self.from_uri(uri)
             if blob is None:
                 raise FacesynthError(f"{self.path} lacks its binary part; export it as .glb")
             self._blobs[index] = bytes(blob)
         return self._blobs[index]
 
-    def _from_uri(self, uri: str) -> bytes:
+    def from_uri(self, uri: str) -> bytes:
+        """Bytes written into the document, or of a file beside it."""
         import base64
 
         if uri.startswith("data:"):
@@ -157,7 +159,7 @@ class _Buffers:
         return beside.read_bytes()
 
 
-def _scene(document: gl.GLTF2, buffers: _Buffers, texels: int) -> Scene:
+def _scene(document: gl.GLTF2, buffers: Buffers, texels: int) -> Scene:
     count = len(document.nodes)
     parents = [-1] * count
     for index, node in enumerate(document.nodes):
@@ -197,13 +199,15 @@ def _matrix(node: gl.Node) -> NDArray[np.float64]:
 
 
 def _part(
-    document: gl.GLTF2, buffers: _Buffers, index: int, primitive: gl.Primitive, places: NDArray[np.float64], texels: int
+    document: gl.GLTF2, buffers: Buffers, index: int, primitive: gl.Primitive, places: NDArray[np.float64], texels: int
 ) -> Part:
     node = document.nodes[index]
     mesh = document.meshes[node.mesh]
     vertices = buffers.array(primitive.attributes.POSITION)
     corners = np.arange(len(vertices)) if primitive.indices is None else buffers.array(primitive.indices)[:, 0].astype(np.int64)
     triangles = corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    if _is_gauze(document, primitive):
+        triangles = triangles[:0]
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= len(vertices):
         raise FacesynthError(f"{buffers.path}: a triangle names a vertex that does not exist; export it again")
     follows, turns = _follows(document, buffers, index, primitive, places, len(vertices))
@@ -223,7 +227,7 @@ def target_names(mesh: gl.Mesh) -> tuple[str, ...]:
     return tuple(str(given[k]) if k < len(given) else f"target_{k}" for k in range(count))
 
 
-def _targets(buffers: _Buffers, primitive: gl.Primitive, count: int) -> list[NDArray[np.float64]]:
+def _targets(buffers: Buffers, primitive: gl.Primitive, count: int) -> list[NDArray[np.float64]]:
     targets = []
     for target in primitive.targets or []:
         position = target.get("POSITION") if isinstance(target, dict) else target.POSITION
@@ -235,7 +239,7 @@ def _targets(buffers: _Buffers, primitive: gl.Primitive, count: int) -> list[NDA
 
 
 def _follows(
-    document: gl.GLTF2, buffers: _Buffers, index: int, primitive: gl.Primitive, places: NDArray[np.float64], count: int
+    document: gl.GLTF2, buffers: Buffers, index: int, primitive: gl.Primitive, places: NDArray[np.float64], count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shares [V, nodes] with which vertices follow nodes, and the matrices [V, 4, 4] that place them at rest."""
     follows = np.zeros((count, len(places)))
@@ -266,7 +270,7 @@ def _patch_places(texels: int) -> NDArray[np.float64]:
 
 
 def _colours(
-    document: gl.GLTF2, buffers: _Buffers, primitive: gl.Primitive, triangles: NDArray[np.int64], texels: int
+    document: gl.GLTF2, buffers: Buffers, primitive: gl.Primitive, triangles: NDArray[np.int64], texels: int
 ) -> NDArray[np.float64]:
     factor, picture, channel = np.array([0.6, 0.6, 0.6]), None, 0
     if primitive.material is not None:
@@ -287,14 +291,22 @@ def _colours(
     return flat * (picture[row, column] / 255.0) ** 2.2
 
 
-def _picture(document: gl.GLTF2, buffers: _Buffers, texture: int) -> NDArray[np.uint8] | None:
+def _is_gauze(document: gl.GLTF2, primitive: gl.Primitive) -> bool:
+    """Whether one sees through a primitive more than one sees it: drawn solid, lashes would be black bars."""
+    if primitive.material is None or document.materials[primitive.material].alphaMode != gl.BLEND:
+        return False
+    surface = document.materials[primitive.material].pbrMetallicRoughness
+    return surface is not None and (surface.baseColorFactor or [1, 1, 1, 1])[3] < 0.5
+
+
+def _picture(document: gl.GLTF2, buffers: Buffers, texture: int) -> NDArray[np.uint8] | None:
     """[H, W, 3] a picture inside the file; None for one that is elsewhere or of a kind that is not known."""
     from PIL import Image
 
     image = document.images[document.textures[texture].source]
     if image.bufferView is None and not (image.uri or "").startswith("data:"):
         return None
-    content = buffers.bytes_of(image.bufferView) if image.bufferView is not None else buffers._from_uri(image.uri)
+    content = buffers.bytes_of(image.bufferView) if image.bufferView is not None else buffers.from_uri(image.uri)
     try:
         with Image.open(io.BytesIO(content)) as opened:
             opened.thumbnail((4096, 4096))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from facesynth.face.files.skin import SIDE, skin_jpeg
+from facesynth.face.files.skin_picture import SIDE, skin_jpeg
 from facesynth.face.markers import INNER_LIPS
 from facesynth.face.rig import PARTS
 
