@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
+from facesynth.methods.efase.soft import Mixture, mean_motion
 from facesynth.motion.smoothing import smooth_joint
 from facesynth.motion.warp import time_warp
 
@@ -32,19 +34,30 @@ class Smoothing:
 
 
 def concatenate(
-    nodes: MotionNodes, path: Ints, phones: tuple[str, ...], bounds: Ints, rest: Floats, fps: float, smoothing: Smoothing
+    nodes: MotionNodes,
+    path: Ints,
+    phones: tuple[str, ...],
+    bounds: Ints,
+    rest: Floats,
+    fps: float,
+    smoothing: Smoothing,
+    mixtures: Sequence[Mixture | None] | None = None,
 ) -> Floats:
     """Frames [T, D] of one search result.
 
     path [P] a node for each phone (ignored where it is `pau`), bounds [P + 1] first frames of the
-    phones, rest [P, D] the rest pose at each phone.
+    phones, rest [P, D] the rest pose at each phone. Where there are mixtures [P], each phone is the mean
+    of its time-warped nodes, and a joint is smoothed as far as it is probably none that was captured.
     """
     frames = np.zeros((bounds[-1], nodes.frames.shape[1]))
     spoken = np.array([phone != "pau" for phone in phones])
-    for node, speaks, start, stop in zip(path, spoken, bounds[:-1], bounds[1:], strict=True):
-        if speaks and stop > start:
-            frames[start:stop] = time_warp(nodes.motion(int(node)), int(stop - start))
-    frames = _smooth_joints(frames, nodes, path, phones, spoken, bounds, fps, smoothing)
+    for t in np.flatnonzero(spoken & (np.diff(bounds) > 0)).tolist():
+        start, stop = int(bounds[t]), int(bounds[t + 1])
+        mixture = mixtures[t] if mixtures is not None else None
+        frames[start:stop] = (
+            mean_motion(nodes, mixture, stop - start) if mixture else time_warp(nodes.motion(int(path[t])), stop - start)
+        )
+    frames = _smooth_joints(frames, nodes, path, phones, bounds, fps, smoothing, mixtures)
     for first, stop in _runs(~spoken):
         _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
     return frames
@@ -65,21 +78,31 @@ def _smooth_joints(
     nodes: MotionNodes,
     path: Ints,
     phones: tuple[str, ...],
-    spoken: np.ndarray,
     bounds: Ints,
     fps: float,
     smoothing: Smoothing,
+    mixtures: Sequence[Mixture | None] | None,
 ) -> Floats:
     weight = {**dict.fromkeys(FIRM, smoothing.firm), **dict.fromkeys(LOOSE, smoothing.loose)}
     weights = np.repeat([weight.get(phone, 1.0) for phone in phones], np.diff(bounds))
     reach = max(3, round(smoothing.reach_s * fps))
     stiffness = smoothing.stiffness * (fps / 120) ** 3
-    for joint in joints(nodes, path, phones, bounds):
-        t = int(np.searchsorted(bounds, joint, side="right")) - 1
-        inside = min(reach, int(bounds[t] - bounds[t - 1]), int(bounds[t + 1] - bounds[t]))
-        if inside > 0:
-            frames = smooth_joint(frames, int(joint), inside, weights, stiffness)
+    for t in range(1, len(path)):
+        strength = _jump(nodes, path, phones, mixtures, t)
+        place = int(np.searchsorted(bounds, bounds[t], side="right")) - 1  # t, or the phone after those without frames
+        inside = min(reach, int(bounds[place] - bounds[place - 1]), int(bounds[place + 1] - bounds[place]))
+        if strength > 0 and inside > 0:
+            smooth = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness)
+            frames = smooth if strength == 1 else frames + strength * (smooth - frames)
     return frames
+
+
+def _jump(nodes: MotionNodes, path: Ints, phones: tuple[str, ...], mixtures: Sequence[Mixture | None] | None, t: int) -> float:
+    """Probability that phone t was not captured right after the phone before it; 0 beside silence."""
+    if "pau" in (phones[t - 1], phones[t]):
+        return 0.0
+    mixture = mixtures[t] if mixtures is not None else None
+    return 1 - mixture.captured if mixture else float(nodes.before[path[t]] != path[t - 1])
 
 
 def _runs(silent: np.ndarray) -> list[tuple[int, int]]:

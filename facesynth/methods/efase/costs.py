@@ -50,13 +50,15 @@ class Query:
     """Hard constraints: position in the input -> node."""
     strict: NDArray[np.bool_] | None = None
     """[T] where no node of another viseme class is allowed; nowhere if it is None."""
+    heard: Floats | None = None
+    """[T, N] audio cost of every node at every phone, not negative; none if it is None."""
 
     def __len__(self) -> int:
         return len(self.phones)
 
 
 def target_costs(nodes: MotionNodes, query: Query, t: int, weights: Weights) -> Floats:
-    """[N] OC + EMP + B of every node at position t; infinite where a hard constraint forbids the node."""
+    """[N] OC + EMP + B, and the audio cost, of every node at position t; infinite where a hard constraint forbids the node."""
     cost = np.zeros(len(nodes))
     if query.phones[t] >= 0:
         other = nodes.phones != query.phones[t]
@@ -64,6 +66,8 @@ def target_costs(nodes: MotionNodes, query: Query, t: int, weights: Weights) -> 
         cost += np.where(other, np.where(same_viseme, weights.gamma, 1.0) * weights.delta * weights.pnt, 0.0)
     if query.emotions[t] >= 0:
         cost += np.where(nodes.emotions != query.emotions[t], weights.phi * weights.pnt, 0.0)
+    if query.heard is not None:
+        cost += query.heard[t]
     if query.strict is not None and query.strict[t]:
         cost[nodes.visemes != query.visemes[t]] = np.inf
     if t in query.fixed:

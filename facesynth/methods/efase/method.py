@@ -14,7 +14,7 @@ from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
-from facesynth.methods.efase.costs import Query, Weights
+from facesynth.methods.efase.costs import Query, Weights, target_costs
 from facesynth.methods.efase.database import build_database
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.explanation import explain, shares
@@ -23,6 +23,7 @@ from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import Plan, plan_speech
 from facesynth.methods.efase.search import Path, SearchIndex, build_index, search
+from facesynth.methods.efase.soft import Mixture, soft_search
 from facesynth.methods.efase.trees import Forest
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
@@ -48,6 +49,10 @@ class Efase(Method):
     of 300 utterances); configs/efase_published.yaml has those of Deng 2006. `penalty` is PNT as a multiple of
     the median rule-2 transition of the database; `database_fps` the rate at which nodes are cut, `bridge_pauses`
     whether silence is a step of the search (see `plan`).
+
+    `temperature` 0 is the paper: the cheapest path. Above 0 (in median rule-2 transitions, like `penalty`) every
+    path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
+    (see `soft`): nearer to the truth on average, with less motion.
     """
 
     pca: Pca
@@ -76,12 +81,17 @@ class Efase(Method):
         smoothing_loose: float = 0.5,
         smoothing_s: float = 0.025,
         smoothing_stiffness: float = 1.0,
+        temperature: float = 0.0,
+        candidates: int = 150,
     ) -> None:
         super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
+        if temperature < 0 or candidates < 1:
+            raise FacesynthError(f"temperature must be at least 0 and candidates at least 1; got {temperature:g}, {candidates}")
         self.smoothing = Smoothing(smoothing_firm, smoothing_loose, smoothing_s, smoothing_stiffness)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self._index: SearchIndex | None = None
         self._transitions: Tensor | None = None
+        self._gaps: dict[int, float] = {}
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
@@ -130,7 +140,14 @@ class Efase(Method):
     def plan(self, speech: Speech, *, emotion: str | None = None, constraints: Mapping[int, str] | None = None) -> Plan:
         """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
         query = self._query(speech, emotion, constraints or {})
-        return plan_speech(query, self._search, bridge_pauses=self.config["bridge_pauses"])
+        soften = self._soften if self.config["temperature"] > 0 else None
+        return plan_speech(query, self._search, soften, bridge_pauses=self.config["bridge_pauses"])
+
+    def _soften(self, query: Query, path: Path) -> list[Mixture]:
+        nodes, weights = self.nodes(), self.weights()
+        targets = np.stack([target_costs(nodes, query, t, weights) for t in range(len(query))])
+        temperature = self.config["temperature"] * (self.facts.get("median_transition") or 1.0)
+        return soft_search(nodes, query, targets, weights, path.nodes, temperature, self.config["candidates"])
 
     def _search(self, query: Query) -> Path:
         if self.node_frames.device.type == "cpu":
@@ -197,19 +214,27 @@ class Efase(Method):
         return other
 
     def _keep_index(self) -> None:
-        self._index = build_index(self.nodes(), self.weights())
+        self._index, self._gaps = build_index(self.nodes(), self.weights()), {}
         forest = self._index.forest
         for field in FOREST_FIELDS:
             self.register_buffer(f"forest_{field}", torch.from_numpy(getattr(forest, field)))
         self.register_buffer("nearest", torch.from_numpy(self._index.tables.nearest))
 
     def _closures(self, plan: Plan, labels: Sequence[str]) -> Floats:
-        """[P] smallest lip gap of the node at each p, b, m as it was captured; NaN elsewhere."""
+        """[P] smallest lip gap of the node at each p, b, m as it was captured (the mean of a mixture's); NaN elsewhere."""
         nodes, wanted = self.nodes(), np.full(len(labels), np.nan)
         for k, (label, node) in enumerate(zip(labels, plan.nodes, strict=True)):
             if label in BILABIALS and node >= 0:
-                wanted[k] = gap(decode(self.pca, nodes.motion(int(node))), self.fitted_layout).min()
+                mixture = plan.mixtures[k] if plan.mixtures else None
+                shut = [self._gap(nodes, int(n)) for n in (mixture.nodes if mixture else [node])]
+                wanted[k] = np.dot(mixture.shares, shut) if mixture else shut[0]
         return wanted
+
+    def _gap(self, nodes: MotionNodes, node: int) -> float:
+        """Smallest lip gap of a node as it was captured."""
+        if node not in self._gaps:
+            self._gaps[node] = float(gap(decode(self.pca, nodes.motion(node)), self.fitted_layout).min())
+        return self._gaps[node]
 
     def _query(self, speech: Speech, emotion: str | None, constraints: Mapping[int, str]) -> Query:
         labels, _ = self._phones(speech)
@@ -249,7 +274,7 @@ class Efase(Method):
         labels, bounds = self._phones(speech)
         rest = self.rest_of(speech, emotion)
         fps = self.config["database_fps"]
-        coordinates = concatenate(self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing)
+        coordinates = concatenate(self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing, plan.mixtures)
         return decode(self.pca, coordinates)
 
 

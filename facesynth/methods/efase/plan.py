@@ -8,7 +8,7 @@ of a long input small. `bridge_pauses` gives the paper's reading.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from facesynth.methods.efase.costs import Query
 from facesynth.methods.efase.nodes import Ints
 from facesynth.methods.efase.search import Path
+from facesynth.methods.efase.soft import Mixture
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +27,29 @@ class Plan:
     nodes: Ints
     """[P] a node for each phone of the input; -1 in silence between searches."""
     cost: float
+    mixtures: tuple[Mixture | None, ...] | None = None
+    """P mixtures of nodes, none in silence between searches; None where only the cheapest path counts."""
 
 
-def plan_speech(query: Query, search: Callable[[Query], Path], *, bridge_pauses: bool) -> Plan:
-    """Search each stretch of the query, or all of it at once."""
+def plan_speech(
+    query: Query,
+    search: Callable[[Query], Path],
+    soften: Callable[[Query, Path], Sequence[Mixture]] | None = None,
+    *,
+    bridge_pauses: bool,
+) -> Plan:
+    """Search each stretch of the query, or all of it at once; `soften` finds what stands beside a cheapest path."""
     nodes = np.full(len(query), -1, np.int64)
+    mixtures: list[Mixture | None] = [None] * len(query)
     cost = 0.0
     for places in [np.arange(len(query))] if bridge_pauses else stretches(query.phones):
-        path = search(part(query, places))
+        asked = part(query, places)
+        path = search(asked)
         nodes[places] = path.nodes
         cost += path.cost
-    return Plan(query, nodes, cost)
+        if soften is not None:
+            mixtures[places[0] : places[-1] + 1] = soften(asked, path)
+    return Plan(query, nodes, cost, None if soften is None else tuple(mixtures))
 
 
 def stretches(phones: Ints) -> list[Ints]:
@@ -50,4 +63,5 @@ def part(query: Query, places: Ints) -> Query:
     first = int(places[0])
     fixed = {t - first: node for t, node in query.fixed.items() if first <= t <= places[-1]}
     strict = None if query.strict is None else query.strict[places]
-    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed, strict)
+    heard = None if query.heard is None else query.heard[places]
+    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed, strict, heard)

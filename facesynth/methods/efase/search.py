@@ -114,13 +114,14 @@ def search(index: SearchIndex, query: Query) -> Path:
     """The path of least COST; ties go to the lowest node. Memory grows with T · N."""
     tables, state = index.tables, _State.empty(len(query), index.tables)
     targets = _tree_targets(index, query)
+    heard = np.zeros((len(query), len(tables.node))) if query.heard is None else query.heard[:, tables.node]
     fixed = np.full(len(query), -1, np.int64)
     row_of = np.argsort(tables.node)
     for t, node in query.fixed.items():
         fixed[t] = row_of[node]
     scale = index.weights.beta, index.weights.pnt, index.weights.alpha
     for t in track(range(len(query)), "searching"):
-        _advance(t, tables, state, targets, fixed, *scale)
+        _advance(t, tables, state, targets, heard, fixed, *scale)
     rows = _backtrack(state, len(query))
     path = tables.node[rows]
     return Path(path, path_cost(index.nodes, query, path, index.weights), float(state.known.mean()))
@@ -243,9 +244,9 @@ def _bends(frames, starts):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
+def _advance(t, tables, state, targets, heard, fixed, beta, pnt, alpha):  # type: ignore[no-untyped-def]
     """Compute the phi of position t that may be its smallest; bound all the others."""
-    _bound_rows(t, tables, state, targets, fixed, pnt, alpha)
+    _bound_rows(t, tables, state, targets, heard, fixed, pnt, alpha)
     _bound_balls(t, tables, state)
     state.least[t], state.least_at[t] = np.inf, -1
     for tree in np.argsort(state.bound[t][tables.roots[:-1]], kind="mergesort"):
@@ -255,7 +256,7 @@ def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignor
         for row in range(tables.ball_starts[root], tables.ball_stops[root]):
             if state.phi[t, row] > state.least[t] * MARGIN or state.phi[t, row] == np.inf:
                 continue
-            _evaluate(t, row, tables, state, targets, beta, pnt)
+            _evaluate(t, row, tables, state, targets, heard, beta, pnt)
             phi, best = state.phi[t, row], state.least[t]
             if phi < best or (phi == best and tables.node[row] < tables.node[state.least_at[t]]):
                 state.least[t], state.least_at[t] = phi, row
@@ -268,7 +269,7 @@ def _advance(t, tables, state, targets, fixed, beta, pnt, alpha):  # type: ignor
 
 
 @njit(cache=True)
-def _bound_rows(t, tables, state, targets, fixed, pnt, alpha):  # type: ignore[no-untyped-def]
+def _bound_rows(t, tables, state, targets, heard, fixed, pnt, alpha):  # type: ignore[no-untyped-def]
     for row in range(len(tables.node)):
         bound = 0.0
         if fixed[t] >= 0 and row != fixed[t]:
@@ -279,7 +280,7 @@ def _bound_rows(t, tables, state, targets, fixed, pnt, alpha):  # type: ignore[n
             captured = tables.before[row]
             alike = state.viseme_bound[tables.visemes[captured]] + tables.nearest[row]
             bound = min(state.phi[t - 1, captured], alike, state.least[t - 1] + pnt)
-        state.phi[t, row] = bound + targets[t, tables.tree_of[row]]
+        state.phi[t, row] = bound + targets[t, tables.tree_of[row]] + heard[t, row]
 
 
 @njit(cache=True)
@@ -295,12 +296,12 @@ def _bound_balls(t, tables, state):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _evaluate(t, row, tables, state, targets, beta, pnt):  # type: ignore[no-untyped-def]
+def _evaluate(t, row, tables, state, targets, heard, beta, pnt):  # type: ignore[no-untyped-def]
     """phi of one row; whatever unknown phi of earlier positions it asks for is computed first."""
     stack = [row]
     while len(stack) > 0:
         at = t - len(stack) + 1
-        asked = _predecessor(at, stack[-1], tables, state, targets, beta, pnt)
+        asked = _predecessor(at, stack[-1], tables, state, targets, heard, beta, pnt)
         if asked < 0:
             stack.pop()
         else:
@@ -308,9 +309,9 @@ def _evaluate(t, row, tables, state, targets, beta, pnt):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _predecessor(t, row, tables, state, targets, beta, pnt):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - one search loop
+def _predecessor(t, row, tables, state, targets, heard, beta, pnt):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - one search loop
     """Set phi and back of one row and return -1, or return a row of position t - 1 that must be known first."""
-    target = targets[t, tables.tree_of[row]]
+    target = targets[t, tables.tree_of[row]] + heard[t, row]
     captured = tables.before[row]
     if t == 0 or captured < 0:
         state.back[t, row] = state.least_at[t - 1] if t else -1
