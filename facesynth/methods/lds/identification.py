@@ -8,10 +8,9 @@ import numpy as np
 
 from facesynth.errors import FacesynthError
 from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
-from facesynth.methods.lds.stochastic import predictor_space, realise
+from facesynth.methods.lds.stochastic import FEWEST_ROWS, noise_rows, predictor_space, realise
 from facesynth.methods.lds.system import Array, Clip, LinearSystem
 
-FEWEST_ROWS = 2
 REFITS = 2
 """How often the deterministic part is fitted again with the noise model known."""
 
@@ -24,15 +23,16 @@ def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> Linea
     the deterministic part leaves of the output and not from the projection that is orthogonal
     to the inputs, because that projection still holds deterministic state that a finite window cannot see.
     """
-    require_rows_for(orders, rows, clips[0].u.shape[1], clips[0].y.shape[1])
+    past = noise_rows(sum(len(clip.y) for clip in clips), rows, clips[0].y.shape[1])
+    require_rows_for(orders, (rows, past), clips[0].u.shape[1], clips[0].y.shape[1])
     gamma, singular = observability(clips, rows)
     A, C = shift_invariance(gamma, clips[0].y.shape[1], orders[0])
     A, repaired = stabilised(A)
     deterministic, starts = fit_inputs(A, C, clips, None)
     for refit in range(REFITS + 1):
         rest = [clip.y - deterministic.simulate(clip.u, start) for clip, start in zip(clips, starts, strict=True)]
-        functionals, correlations = predictor_space(rest, rows)
-        stochastic, moved = realise(rest, rows, functionals, orders[1])
+        functionals, correlations = predictor_space(rest, past)
+        stochastic, moved = realise(rest, past, functionals, orders[1])
         if refit < REFITS:
             deterministic, starts = fit_inputs(A, C, clips, stochastic)
     return LinearSystem(deterministic, stochastic, starts, singular, correlations, repaired + moved)
@@ -60,13 +60,14 @@ def fitting_rows(clips: Sequence[Clip], wanted: int) -> int:
     )
 
 
-def require_rows_for(orders: tuple[int, int], rows: int, m: int, p: int) -> None:
-    """FacesynthError where Hankel matrices of `rows` block rows cannot show so many states."""
-    most = min((rows - 1) * p, rows * m), rows * p
+def require_rows_for(orders: tuple[int, int], rows: tuple[int, int], m: int, p: int) -> None:
+    """FacesynthError where Hankel matrices of so many block rows (deterministic, stochastic) cannot show so many states."""
+    most = min((rows[0] - 1) * p, rows[0] * m), rows[1] * p
     if not (1 <= orders[0] <= most[0] and 1 <= orders[1] <= most[1]):
         raise FacesynthError(
-            f"{orders[0]} deterministic and {orders[1]} stochastic states do not fit: with {rows} block rows, {m} features and "
-            f"{p} components there can be 1 to {most[0]} and 1 to {most[1]}; lower the orders or raise rows"
+            f"{orders[0]} deterministic and {orders[1]} stochastic states do not fit: with {rows[0]} and {rows[1]} block rows, "
+            f"{m} features and {p} components there can be 1 to {most[0]} and 1 to {most[1]}; lower the orders, raise rows, or "
+            "record more"
         )
 
 

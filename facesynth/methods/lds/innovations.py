@@ -72,11 +72,6 @@ def innovations_of(signals: Sequence[Array], noise: Stochastic, burn_in: int) ->
     return np.concatenate([noise.innovations(y[:, :, None])[0][burn_in:, :, 0] for y in signals])
 
 
-def no_change_error(signals: Sequence[Array], weights: Array) -> float:
-    """Mean squared error [unit squared] of predicting each frame by the one before it; `weights` [p] are squared scales."""
-    return float(np.concatenate([np.diff(y, axis=0) ** 2 @ weights for y in signals]).mean())
-
-
 def _symmetric_root(e: Array) -> Array:
     values, vectors = np.linalg.eigh(np.cov(e, rowvar=False).reshape(e.shape[1], -1))
     return (vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T

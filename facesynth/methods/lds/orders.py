@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
-from facesynth.methods.lds.stochastic import predictor_space, realise
+from facesynth.methods.lds.stochastic import noise_rows, predictor_space, realise
 from facesynth.methods.lds.system import Array, Clip, Deterministic
 
 FOLDS = 4
@@ -74,13 +74,20 @@ def stochastic_errors(parts: Sequence[Fold], rows: int, order: int, orders: Sequ
     def judge(fold: Fold) -> Array:
         gamma, _ = observability(fold.train, rows)
         model = _deterministic(fold.train, gamma, order)
+        past = noise_rows(sum(len(clip.y) for clip in fold.train), rows, fold.train[0].y.shape[1])
         rest = [clip.y - model.simulate(clip.u) for clip in fold.train]
-        functionals, _ = predictor_space(rest, rows)
-        noises = [realise(rest, rows, functionals, candidate)[0] for candidate in orders]
+        functionals, _ = predictor_space(rest, past)
+        noises = [realise(rest, past, functionals, candidate)[0] for candidate in orders]
         left = [(clip.y - model.simulate(clip.u))[:, :, None] for clip in fold.test]
         return np.array([[_mean_square(noise.innovations(y)[0][rows:, :, 0], weights) for y in left] for noise in noises])
 
     return np.concatenate([judge(fold) for fold in parts], axis=1)
+
+
+def no_change_error(parts: Sequence[Fold], rows: int, weights: Array) -> float:
+    """What `stochastic_errors` would be of predicting each frame by the one before it."""
+    clips = [clip for fold in parts for clip in fold.test]
+    return float(np.mean([_mean_square(np.diff(clip.y, axis=0)[rows - 1 :], weights) for clip in clips]))
 
 
 def plainest_good(candidates: Sequence[float], errors: Array) -> Choice:

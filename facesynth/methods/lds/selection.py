@@ -8,7 +8,16 @@ from typing import Any, Literal
 import numpy as np
 
 from facesynth.methods.lds.identification import fitting_rows
-from facesynth.methods.lds.orders import Choice, deterministic_errors, folds, plainest_good, stochastic_errors
+from facesynth.methods.lds.orders import (
+    Choice,
+    Fold,
+    deterministic_errors,
+    folds,
+    no_change_error,
+    plainest_good,
+    stochastic_errors,
+)
+from facesynth.methods.lds.stochastic import noise_rows
 from facesynth.methods.lds.system import Array, Clip
 from facesynth.progress import track
 
@@ -38,19 +47,27 @@ def choose_lead(
 
 def choose_orders(
     wanted: tuple[int | Auto, int | Auto], clips: list[Clip], sentences: Sequence[str], rows: int, weights: Array
-) -> tuple[Choice, Choice]:
-    """The numbers of deterministic and of stochastic states."""
+) -> tuple[Choice, Choice, float]:
+    """The numbers of deterministic and of stochastic states, and the error of predicting no change on the same clips."""
     parts = folds(clips, sentences, rows)
-    orders = possible_orders(clips, rows)
+    orders, noises = possible_orders(clips, rows), possible_noises(parts, rows)
     deterministic = _given(wanted[0]) or plainest_good(orders, deterministic_errors(parts, rows, orders, weights))
     chosen = int(deterministic.chosen)
-    return deterministic, _given(wanted[1]) or plainest_good(orders, stochastic_errors(parts, rows, chosen, orders, weights))
+    stochastic = _given(wanted[1]) or plainest_good(noises, stochastic_errors(parts, rows, chosen, noises, weights))
+    return deterministic, stochastic, no_change_error(parts, rows, weights)
 
 
 def possible_orders(clips: Sequence[Clip], rows: int) -> list[int]:
     """Candidates that the Hankel matrices can show with rows to spare."""
     width = min(clips[0].u.shape[1], clips[0].y.shape[1])
     return [order for order in ORDERS if order <= max(1, (rows - 1) * width // 2)]
+
+
+def possible_noises(parts: Sequence[Fold], rows: int) -> list[int]:
+    """Candidates for the stochastic part that the shortest training side can show with as many to spare."""
+    outputs = parts[0].train[0].y.shape[1]
+    least = min(noise_rows(sum(len(clip.y) for clip in part.train), rows, outputs) for part in parts)
+    return [order for order in ORDERS if order <= max(1, least * outputs // 2)]
 
 
 def plain(choice: Choice) -> dict[str, Any]:

@@ -13,6 +13,15 @@ from facesynth.methods.lds.deterministic import stabilised
 from facesynth.methods.lds.regression import solve, triangle
 from facesynth.methods.lds.system import Array, Stochastic
 
+FRAMES_FOR_A_PAST = 30
+"""Frames there must be for each number of the past that the noise is predicted from; fewer make it fit what never recurs."""
+FEWEST_ROWS = 2
+
+
+def noise_rows(frames: int, rows: int, outputs: int) -> int:
+    """Block rows for the stochastic part: `rows`, or as few as a recording of so many frames bears."""
+    return max(FEWEST_ROWS, min(rows, frames // (FRAMES_FOR_A_PAST * outputs)))
+
 
 def predictor_space(signals: Sequence[Array], rows: int) -> tuple[Array, Array]:
     """What of the past of y_s predicts its future: [k p, k p] functionals, strongest first, and canonical correlations.
