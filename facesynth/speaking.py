@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from facesynth.errors import unknown
 from facesynth.face.animation import FaceAnimation, animate
-from facesynth.face.files.write import SUFFIXES, write_animation
+from facesynth.face.files.write import SUFFIXES, require_arkit, write_animation
 from facesynth.face.rig import Rig, pose
 from facesynth.methods.method import Method
 from facesynth.motion.motion import Motion
@@ -24,6 +24,7 @@ from facesynth.progress import track
 from facesynth.speech.speech import Speech
 
 if TYPE_CHECKING:
+    from facesynth.face.own_head import OwnHead
     from facesynth.face.render import Renderer
     from facesynth.face.skin import MarkerSkin
 
@@ -102,16 +103,41 @@ def check_output(path: str | Path) -> Path:
     return Path(path)
 
 
-def write_performance(path: str | Path, performance: Performance, rig: Rig, size: tuple[int, int] = (1280, 720)) -> None:
-    """Write one output; the suffix says which. It appears whole or not at all."""
-    if check_output(path).suffix.lower() not in VIDEO_SUFFIXES:
+def write_performance(
+    path: str | Path, performance: Performance, rig: Rig, size: tuple[int, int] = (1280, 720), own: OwnHead | None = None
+) -> None:
+    """Write one output; the suffix says which. It appears whole or not at all.
+
+    own: the head that is shown, if it is not the built-in one.
+    """
+    is_video = check_output(path).suffix.lower() in VIDEO_SUFFIXES
+    if own is not None and (is_video or Path(path).suffix.lower() != ".bvh"):
+        _write_on(own, path, performance, size)
+        return
+    if not is_video:
         write_animation(path, performance.animation, rig, performance.motion)
         return
     from facesynth.face.render import Renderer
     from facesynth.face.video import write_video
 
+    require_arkit(performance.animation, path)
     frames = rendered(performance, rig, Renderer(rig, size))
     write_video(path, frames, performance.animation.fps, performance.speech.audio, performance.speech.sample_rate)
+
+
+def _write_on(own: OwnHead, path: str | Path, performance: Performance, size: tuple[int, int]) -> None:
+    from facesynth.face.files.own import write_own
+    from facesynth.face.own_animation import on_channels
+
+    animation = on_channels(performance.animation, own.map)
+    if Path(path).suffix.lower() not in VIDEO_SUFFIXES:
+        write_own(path, animation, own)
+        return
+    from facesynth.face.own_render import OwnRenderer
+    from facesynth.face.video import write_video
+
+    pictures = OwnRenderer(own, size).pictures(animation)
+    write_video(path, pictures, animation.fps, performance.speech.audio, performance.speech.sample_rate)
 
 
 def rendered(performance: Performance, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:

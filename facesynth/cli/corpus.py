@@ -14,6 +14,7 @@ import click
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
+    from facesynth.corpus.workers import Engine, Workers
     from facesynth.motion.layout import Layout
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
@@ -21,6 +22,22 @@ EMOTIONS = ("neutral", "happy", "angry", "sad")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+
+
+def spread_over(command: Any) -> Any:
+    """Who does the work: the options --jobs, --engine and --address."""
+    options = (
+        click.option(
+            "--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Tasks at once; all cores otherwise."
+        ),
+        click.option(
+            "--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works."
+        ),
+        click.option("--address", default="", help="Of a Ray cluster that sees the same files; this computer otherwise."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 @click.group("corpus")
@@ -80,7 +97,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px; it is found otherwise.")
 @click.option("--mask", type=FILE, help="With --points: PNG of the first picture's size, the lower face in white.")
 @click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
-@click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Processes at once; all cores otherwise.")
+@spread_over
 @as_json
 def add(
     *,
@@ -98,6 +115,8 @@ def add(
     mask: Path | None,
     performer: str | None,
     jobs: int,
+    engine: Engine,
+    address: str,
     as_json: bool,
     **about: Any,
 ) -> None:
@@ -112,7 +131,9 @@ def add(
     from facesynth.corpus.add import add as add_recordings
     from facesynth.corpus.record import read_records
     from facesynth.corpus.transcripts import read_transcripts
+    from facesynth.corpus.workers import Workers
 
+    workers = Workers(jobs, engine, address)
     is_table = text_file is not None and text_file.suffix.lower() == ".csv"
     known = {**about, "text": text or (_read_text(text_file) if text_file and not is_table else None), "id": utterance_id}
     listed, texts = (
@@ -125,7 +146,7 @@ def add(
     elif points or box or mask:
         corpus = _from_points(folder, files, _header(folder, performer, about), box, mask, face)
     else:
-        corpus = _from_video(folder, files, performer, face, jobs, about)
+        corpus = _from_video(folder, files, performer, face, workers, about)
     report = add_recordings(
         corpus,
         files,
@@ -135,7 +156,7 @@ def add(
         phones=phones,
         emotions=emotions,
         face=face,
-        jobs=jobs,
+        workers=workers,
     )
     _keep_videos(corpus, files, {*report.added, *report.unchanged}, {name: record.id for name, record in (listed or {}).items()})
     lines = [f"added {len(report.added)}, already there {len(report.unchanged)}, not usable {len(report.refused)}"]
@@ -179,13 +200,15 @@ def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps
 @click.argument("folder", type=FOLDER)
 @click.option("--id", "ids", multiple=True, help="Only this utterance; may be given several times.")
 @click.option("--force", is_flag=True, help="Also where phones were given or corrected by hand.")
+@spread_over
 @as_json
-def align(folder: Path, ids: tuple[str, ...], force: bool, as_json: bool) -> None:
+def align(folder: Path, ids: tuple[str, ...], force: bool, jobs: int, engine: Engine, address: str, as_json: bool) -> None:
     """Place the phones of utterances with a text anew; what was corrected by hand stays."""
     from facesynth.corpus import Corpus
     from facesynth.corpus.align import align as align_corpus
+    from facesynth.corpus.workers import Workers
 
-    report = align_corpus(Corpus.open(folder), ids or None, force)
+    report = align_corpus(Corpus.open(folder), ids or None, force, Workers(jobs, engine, address))
     lines = [f"aligned {len(report.aligned)}, kept {len(report.kept)}, failed {len(report.failed)}"]
     lines += [*_listing("kept", report.kept), *_listing("failed", report.failed), *_remarks(report.warnings)]
     _show(as_json, asdict(report), lines)
@@ -220,12 +243,12 @@ def stats(folder: Path, as_json: bool) -> None:
 
 
 def _from_video(
-    folder: Path, files: tuple[Path, ...], performer: str | None, face: int | None, jobs: int, about: Mapping[str, Any]
+    folder: Path, files: tuple[Path, ...], performer: str | None, face: int | None, workers: Workers, about: Mapping[str, Any]
 ) -> Corpus:
     """A new corpus for the performer of videos."""
     from facesynth.corpus.importers.video import corpus_from_video
 
-    return corpus_from_video(folder, files, _header(folder, performer, about), face=face, jobs=jobs)
+    return corpus_from_video(folder, files, _header(folder, performer, about), face=face, workers=workers)
 
 
 def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.motion_files import load_motion
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_signals
-from facesynth.corpus.workers import spread
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
 from facesynth.motion.planar import is_tracked
@@ -91,14 +91,14 @@ def add(
     phones: Path | None = None,
     emotions: Path | None = None,
     face: int | None = None,
-    jobs: int = 1,
+    workers: Workers = ALONE,
 ) -> AddReport:
     """Add every recording in files and folders; those that cannot be used are named with the reason, the others added.
 
     about: fields of `Record` that hold for every recording; listed: records that hold instead for the recordings of
     these names; texts: what is said, by name. phones, emotions: files of the one recording that is added. face: which
-    one is captured from video with several, counted from the left. jobs: how many processes work at once; the corpus is
-    the same with any number. Recordings that are there already are passed over, so an interrupted run can be repeated.
+    one is captured from video with several, counted from the left. workers: who reads, captures and aligns; the corpus is
+    the same whoever does. Recordings that are there already are passed over, so an interrupted run can be repeated.
     """
     recordings, refused = find_recordings(paths)
     about = about or {}
@@ -113,7 +113,7 @@ def add(
             tasks.append((recording.name, (corpus, _with_text(record, recording.text), recording, face)))
         except FacesynthError as error:
             refused[recording.name] = str(error)
-    return _kept(corpus, tasks, refused, jobs)
+    return _kept(corpus, tasks, refused, workers)
 
 
 def add_recording(corpus: Corpus, record: Record, recording: Recording, face: int | None = None) -> tuple[bool, tuple[str, ...]]:
@@ -157,12 +157,12 @@ def _motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Mot
     return motion_from_video(recording.motion, recording.sound, corpus.layout, corpus.fps, face)
 
 
-def _kept(corpus: Corpus, tasks: list[tuple[str, Task]], refused: dict[str, str], jobs: int) -> AddReport:
-    """Prepare recordings in several processes; write them one after the other, in order, in this one."""
+def _kept(corpus: Corpus, tasks: list[tuple[str, Task]], refused: dict[str, str], workers: Workers) -> AddReport:
+    """Prepare recordings by the workers; write them one after the other, in order, in this one."""
     added: list[str] = []
     unchanged: list[str] = []
     remarks: dict[str, tuple[str, ...]] = {}
-    results = spread(_attempt, [task for _, task in tasks], jobs, "adding")
+    results = spread(_attempt, [task for _, task in tasks], workers, "adding")
     for (name, (_, record, _, _)), result in zip(tasks, results, strict=True):
         try:
             if isinstance(result, FacesynthError):

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 from facesynth.corpus.corpus import Corpus
+from facesynth.corpus.files import Files
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_file
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
-from facesynth.progress import track
 from facesynth.speech.audio import load_audio
 from facesynth.speech.textgrid import write_textgrid
+
+if TYPE_CHECKING:
+    from facesynth.speech.alignment import Alignment
 
 
 @dataclass(frozen=True)
@@ -26,29 +32,26 @@ class AlignReport:
     warnings: Mapping[str, tuple[str, ...]]
 
 
-def align(corpus: Corpus, ids: Iterable[str] | None = None, force: bool = False) -> AlignReport:
+def align(corpus: Corpus, ids: Iterable[str] | None = None, force: bool = False, workers: Workers = ALONE) -> AlignReport:
     """Align sound and text of the utterances `ids` (else of all) and write their TextGrids.
 
-    Phones that a person gave or corrected are kept unless `force` is set.
+    Phones that a person gave or corrected are kept unless `force` is set. The result is the same whoever does the work.
     """
     aligned: list[str] = []
-    kept: dict[str, str] = {}
     failed: dict[str, str] = {}
     warnings: dict[str, tuple[str, ...]] = {}
     records = corpus.records if ids is None else tuple(corpus.record(utterance_id) for utterance_id in ids)
-    for record in track(records, "aligning"):
-        reason = _reason_to_keep(corpus, record, force)
-        if reason:
-            kept[record.id] = reason
+    reasons = {record.id: _reason_to_keep(corpus, record, force) for record in records}
+    records = tuple(record for record in records if not reasons[record.id])
+    results = spread(partial(_attempt, corpus.files), records, workers, "aligning")
+    for record, placed in zip(records, results, strict=True):
+        if isinstance(placed, FacesynthError):
+            failed[record.id] = str(placed)
             continue
-        try:
-            said = _align_one(corpus, record)
-        except FacesynthError as error:
-            failed[record.id] = str(error)
-            continue
+        _keep(corpus, record, placed)
         aligned.append(record.id)
-        warnings.update({record.id: said} if said else {})
-    return AlignReport(tuple(aligned), kept, failed, warnings)
+        warnings.update({record.id: tuple(placed.warnings)} if placed.warnings else {})
+    return AlignReport(tuple(aligned), {name: reason for name, reason in reasons.items() if reason}, failed, warnings)
 
 
 def is_by_hand(corpus: Corpus, record: Record) -> bool:
@@ -65,12 +68,17 @@ def _reason_to_keep(corpus: Corpus, record: Record, force: bool) -> str:
     return ""
 
 
-def _align_one(corpus: Corpus, record: Record) -> tuple[str, ...]:
-    """The TextGrid first, then its hash: interrupted between, the file counts as corrected by hand, which is safe."""
+def _attempt(files: Files, record: Record) -> Alignment | FacesynthError:
     from facesynth.speech.alignment import align as place
 
+    try:
+        return place(*load_audio(files.audio(record.id)), record.text)
+    except FacesynthError as error:
+        return error
+
+
+def _keep(corpus: Corpus, record: Record, placed: Alignment) -> None:
+    """The TextGrid first, then its hash: interrupted between, the file counts as corrected by hand, which is safe."""
     path = corpus.files.phones(record.id)
-    placed = place(*load_audio(corpus.files.audio(record.id)), record.text)
     write_textgrid(path, placed.phones, placed.words)
     corpus.update(replace(record, aligned_hash=hash_file(path)))
-    return tuple(placed.warnings)

@@ -1,35 +1,62 @@
-"""The same work on many things, in several processes, with results in order."""
+"""The same work on many things: in this process, in several, or on a Ray cluster, with the same results in order."""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
 
-from facesynth.errors import FacesynthError
+from facesynth.errors import FacesynthError, unknown
 from facesynth.progress import track
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-
+Engine = Literal["processes", "ray"]
+ENGINES: tuple[Engine, ...] = ("processes", "ray")
 
 MOST_DEATHS = 3
 """A worker that dies so often is ended by what it works on, or for the memory that it takes."""
+OBJECT_STORE_BYTES = 200 * 2**20
+"""Memory in which a local Ray keeps results on their way: one recording each."""
 
 
-def spread(function: Callable[[Item], Result], items: Sequence[Item], jobs: int, what: str) -> Iterator[Result]:
-    """`map(function, items)` in `jobs` processes, showing progress; in this process where one is enough.
+@dataclass(frozen=True)
+class Workers:
+    """Who does the work."""
+
+    jobs: int = 1
+    """How many processes at once; with an address, how many tasks are under way."""
+    engine: Engine = "processes"
+    address: str = ""
+    """Of a Ray cluster (`host:port`, or `auto`), whose machines must see the same files; empty: this computer."""
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise FacesynthError(f"the number of jobs must be 1 or more; got {self.jobs}")
+        if self.engine not in ENGINES:
+            raise unknown("engine", self.engine, ENGINES)
+        if self.address and self.engine != "ray":
+            raise FacesynthError("an address belongs to the engine ray; give --engine ray as well")
+
+
+ALONE = Workers()
+
+
+def spread(function: Callable[[Item], Result], items: Sequence[Item], workers: Workers, what: str) -> Iterator[Result]:
+    """`map(function, items)` by the workers, showing progress; in this process where one is enough.
 
     Where a worker dies, what it had not finished is done again by new ones. FacesynthError where that does not help;
     results until then were yielded.
     """
-    if jobs < 1:
-        raise FacesynthError(f"the number of jobs must be 1 or more; got {jobs}")
-    if jobs == 1 or len(items) < 2:
+    if workers.engine == "ray" and len(items):
+        return track(_on_ray(function, items, workers), what, len(items))
+    if workers.jobs == 1 or len(items) < 2:
         return track(map(function, items), what, len(items))
-    return track(_persistent(function, items, jobs), what, len(items))
+    return track(_persistent(function, items, workers.jobs), what, len(items))
 
 
 def _persistent(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
@@ -42,7 +69,7 @@ def _persistent(function: Callable[[Item], Result], items: Sequence[Item], jobs:
             return
         except BrokenProcessPool:
             continue
-    raise FacesynthError(f"worker processes died {MOST_DEATHS} times (too little memory?); use fewer jobs, what is done is kept")
+    raise _died()
 
 
 def _pooled(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
@@ -51,3 +78,51 @@ def _pooled(function: Callable[[Item], Result], items: Sequence[Item], jobs: int
             yield from pool.map(function, items)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _on_ray(function: Callable[[Item], Result], items: Sequence[Item], workers: Workers) -> Iterator[Result]:
+    """Tasks on a cluster, a few more under way than there are workers; Ray itself starts again what a dead worker left."""
+    ray = _joined(workers)
+
+    def work(item: Item) -> Result:  # Ray takes nothing but plain functions
+        return function(item)
+
+    task = ray.remote(num_cpus=1, max_retries=MOST_DEATHS - 1)(work)
+    waiting: list[Any] = []
+    started = 0
+    try:
+        while started < len(items) or waiting:
+            while started < len(items) and len(waiting) < 2 * workers.jobs:
+                waiting.append(task.remote(items[started]))
+                started += 1
+            yield ray.get(waiting.pop(0))
+    except ray.exceptions.WorkerCrashedError:
+        raise _died() from None
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause or error from None
+    finally:
+        for left in waiting:
+            ray.cancel(left, force=True)
+        ray.shutdown()
+
+
+def _joined(workers: Workers) -> Any:
+    try:
+        import ray
+    except ImportError:
+        raise FacesynthError("the engine ray is not installed; run: pip install 'facesynth[ray]'") from None
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"  # Ray would otherwise tell its makers that it runs
+    quiet: dict[str, Any] = {"logging_level": "ERROR", "log_to_driver": False, "configure_logging": False}
+    try:
+        if workers.address:
+            ray.init(address=workers.address, **quiet)
+        else:
+            ray.init(num_cpus=workers.jobs, include_dashboard=False, object_store_memory=OBJECT_STORE_BYTES, **quiet)
+    except (ConnectionError, RuntimeError, ValueError, OSError, TimeoutError) as error:
+        where = workers.address or "this computer"
+        raise FacesynthError(f"Ray does not start on {where} ({' '.join(str(error).split())[:200]})") from None
+    return ray
+
+
+def _died() -> FacesynthError:
+    return FacesynthError(f"worker processes died {MOST_DEATHS} times (too little memory?); use fewer jobs, what is done is kept")

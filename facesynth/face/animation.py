@@ -131,7 +131,8 @@ def animate(
 ) -> FaceAnimation:
     """Put a motion on a rig, at the motion's rate.
 
-    Markers become weights by bounded least squares on the rig; curves with ARKit names pass through. Blinks and
+    Points become weights by bounded least squares on the rig, wherever they lie on it (`fit_layout`); curves with ARKit
+    names pass through, and where no curve has such a name all keep their own. Blinks and
     gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`.
 
     Parameters
@@ -144,8 +145,11 @@ def animate(
             raise FacesynthError(f"{name} must be 0 (off) or a positive factor; got {gain}")
     _check_whole(motion)
     head = _head_on(rig, motion, head_gain)
-    weights, residual = _weights(motion, rig)
     gaze = _gaze(motion, head, seed) * eyes_gain
+    if motion.layout.kind == "curves" and not arkit_columns(motion.layout):
+        values = np.clip(motion.frames, 0, 1)
+        return FaceAnimation(motion.layout.names, values, head, gaze, np.zeros(len(motion)), motion.fps)
+    weights, residual = _weights(motion, rig)
     shut = _lids(motion, weights, seed) if eyes_gain else np.zeros(len(motion))
     _set_lids(weights, shut, awake=eyes_gain == 0)
     weights = gaze_weights(weights, gaze)
@@ -167,23 +171,28 @@ def _weights(motion: Motion, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.
     if motion.layout.kind == "curves":
         return _curves(motion), None
     from facesynth.face.blendshapes import MarkerBasis, solve_markers
+    from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of
 
     known = np.zeros((len(motion), len(rig.names)))
     if motion.eyes is not None:
         known = gaze_weights(known, motion.eyes[:, 1:])
-    return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
+    if is_of_the_head(motion.layout):
+        return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
+    fit = fit_layout(rig, motion.layout, rest_of(motion))
+    frames = fit.on_head(rig, motion.frames).reshape(len(motion), -1)
+    return solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
+
+
+def arkit_columns(layout: Layout) -> dict[str, int]:
+    """Columns of the curves that have ARKit names, by those."""
+    columns = {name[:1].lower() + name[1:]: i for i, name in enumerate(layout.names)}
+    return {name: columns[name] for name in ARKIT_NAMES if name in columns}
 
 
 def _curves(motion: Motion) -> NDArray[np.float64]:
-    columns = {name[:1].lower() + name[1:]: i for i, name in enumerate(motion.layout.names)}
-    shared = [name for name in ARKIT_NAMES if name in columns]
-    if not shared:
-        raise FacesynthError(
-            f"none of the curves {list(motion.layout.names[:4])} … has an ARKit name such as jawOpen; rename them"
-        )
     weights = np.zeros((len(motion), len(ARKIT_NAMES)))
-    for name in shared:
-        weights[:, ARKIT_NAMES.index(name)] = np.clip(motion.frames[:, columns[name]], 0, 1)
+    for name, column in arkit_columns(motion.layout).items():
+        weights[:, ARKIT_NAMES.index(name)] = np.clip(motion.frames[:, column], 0, 1)
     return weights
 
 
@@ -195,14 +204,19 @@ def _head_on(rig: Rig, motion: Motion, gain: float) -> NDArray[np.float64]:
     if motion.head is None:
         return np.zeros((len(motion), 6))
     head = motion.head.astype(np.float64) * gain
-    lever = PIVOT_MM - _pose_centre(rig, motion.layout)
+    lever = PIVOT_MM - _pose_centre(rig, motion)
     head[:, 3:] += Rotation.from_rotvec(head[:, :3]).apply(lever) - lever
     return head
 
 
-def _pose_centre(rig: Rig, layout: Layout) -> NDArray[np.float64]:
+def _pose_centre(rig: Rig, motion: Motion) -> NDArray[np.float64]:
+    from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of
+
+    layout = motion.layout
     if layout.kind != "markers":
         return PIVOT_MM
+    if not is_of_the_head(layout):
+        return fit_layout(rig, layout, rest_of(motion)).placed_mm()[rigid_points(layout)].mean(axis=0)
     rigid = rigid_points(layout)
     if layout.neutral is not None:
         return np.asarray(layout.neutral).reshape(-1, 3)[rigid].mean(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
@@ -14,6 +15,9 @@ from facesynth.errors import FacesynthError
 from facesynth.face.markers import marker_vertices
 from facesynth.face.rig import ARKIT_NAMES, Rig
 from facesynth.motion.layout import Layout
+
+if TYPE_CHECKING:
+    from facesynth.face.fitting import LayoutFit
 
 TOLERANCE = 2e-5
 """The solver stops when a sweep over all weights moves none by more than this."""
@@ -55,12 +59,26 @@ class MarkerBasis:
         if layout.kind != "markers":
             raise FacesynthError(f"weights are solved from 3-D markers in mm; got a layout of {layout.kind}")
         vertices = marker_vertices(rig, layout)
-        shapes = rig.shapes_mm[:, vertices].reshape(len(rig.names), -1).astype(np.float64)
         rest = rig.rest_mm[vertices].ravel() if layout.neutral is None else np.asarray(layout.neutral)
+        return cls._at(rig, vertices, rest, layout.lip_pairs, np.ones(3))
+
+    @classmethod
+    def fitted(cls, rig: Rig, layout: Layout, fit: LayoutFit) -> MarkerBasis:
+        """The basis of points that a fit has put on the head; of 2-D points nothing is known along the third axis."""
+        order = {int(point): place for place, point in enumerate(fit.points)}
+        pairs = tuple((order[a], order[b]) for a, b in layout.lip_pairs if a in order and b in order)
+        seen = np.array([1.0, 1.0, float(layout.dimension == 3)])
+        return cls._at(rig, fit.vertices, rig.rest_mm[fit.vertices].ravel(), pairs, seen)
+
+    @classmethod
+    def _at(
+        cls, rig: Rig, vertices: NDArray[np.int64], rest: ArrayLike, pairs: tuple[tuple[int, int], ...], seen: NDArray[np.float64]
+    ) -> MarkerBasis:
+        shapes = (rig.shapes_mm[:, vertices] * seen).reshape(len(rig.names), -1).astype(np.float64)
         factors = np.array([SHY.get(name.removesuffix("Left").removesuffix("Right"), 1.0) for name in rig.names])
         free = np.array([name not in UNSEEN for name in rig.names]) & (shapes**2).any(axis=1)
         ridge = RIDGE * (shapes[free] ** 2).sum(axis=1).mean() * factors if free.any() else factors
-        return cls(shapes, rest.astype(np.float64), ridge, free, _gap_rows(layout))
+        return cls(shapes, np.asarray(rest, np.float64), ridge, free, _gap_rows(pairs, len(vertices)))
 
 
 def solve(
@@ -133,9 +151,9 @@ def follow_gap(basis: MarkerBasis, weights: NDArray[np.float64], offsets_mm: NDA
     return corrected
 
 
-def _gap_rows(layout: Layout) -> NDArray[np.float64]:
-    rows = np.zeros((len(layout.lip_pairs), layout.channels))
-    for row, (upper, lower) in zip(rows, layout.lip_pairs, strict=True):
+def _gap_rows(pairs: tuple[tuple[int, int], ...], points: int) -> NDArray[np.float64]:
+    rows = np.zeros((len(pairs), 3 * points))
+    for row, (upper, lower) in zip(rows, pairs, strict=True):
         row[upper * 3 + 1], row[lower * 3 + 1] = 1.0, -1.0
     return rows
 

@@ -64,7 +64,7 @@ class Renderer:
         self._baked = baked_head(rig)
         self._drawn = self._baked.surface.quads[self._baked.surface.material != HIDDEN]
         self._grid = (-(-self.size[0] // TILE), -(-self.size[1] // TILE))
-        self._backdrop, self._curve = _backdrop(*self.size), _curve()
+        self._backdrop, self._curve = backdrop(*self.size), display_curve()
         self._light = orthographic(KEY, _SHADOW_CENTRE_MM, _SHADOW_HALF_MM, _SHADOW_SIZE)
         self._eyes = [(rig.vertices_of(f"{side}_eye"), rig.eye_centre_mm(side)) for side in ("left", "right")]
         self._lips = rig.from_source(np.array(INNER_LIPS[2:5]).T)
@@ -146,7 +146,7 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _backdrop(width: int, height: int) -> NDArray[np.float32]:
+def backdrop(width: int, height: int) -> NDArray[np.float32]:
     """[height, width, 3] a grey studio wall, brighter behind the lit side, with a little noise against banding."""
     y, x = np.mgrid[0:height, 0:width] / float(height)
     distance = np.hypot((x - 0.42 * width / height) * 1.0, (y - 0.40) * 1.15)
@@ -155,7 +155,7 @@ def _backdrop(width: int, height: int) -> NDArray[np.float32]:
     return ((glow + grain)[..., None] * np.array([0.92, 0.97, 1.06])).clip(0).astype(np.float32)
 
 
-def _curve(steps: int = 16384) -> NDArray[np.uint8]:
+def display_curve(steps: int = 16384) -> NDArray[np.uint8]:
     """[steps] display value of linear light 0..4: a shoulder that keeps highlights, then the sRGB curve."""
     linear = (np.arange(steps) + 0.5) * 4 / steps
     mapped = 0.80 * linear * (1 + linear / 12.0) / (1 + 0.42 * linear)

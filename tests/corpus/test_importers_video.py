@@ -1,12 +1,10 @@
 import json
 import shutil
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from interrupted import contents, killed_and_repeated
 
 from facesynth.capture.kept_tracks import kept_track
 from facesynth.capture.landmarks import landmark_layout
@@ -17,13 +15,12 @@ from facesynth.corpus import Corpus
 from facesynth.corpus.add import add, find_recordings
 from facesynth.corpus.importers.video import corpus_from_video, motion_from_video
 from facesynth.corpus.transcripts import read_transcripts
+from facesynth.corpus.workers import Workers
 from facesynth.errors import FacesynthError
 from facesynth.motion.lips import lip_gap
 from facesynth.speech.audio import load_audio, save_wav
 
 LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven please", "swbm3n": "set white by m three now"}
-
-pytestmark = pytest.mark.slow  # films are followed face by face
 
 
 @pytest.fixture
@@ -43,10 +40,6 @@ def clips(recordings, tmp_path):
 
 def videos(clips):
     return sorted(map(str, clips.glob("*.mp*g*")))
-
-
-def contents(path):
-    return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
 
 
 def run(*arguments):
@@ -82,42 +75,22 @@ def test_two_processes_give_the_same_bytes_as_one(clips, tmp_path):
     texts = read_transcripts(clips / "lines.csv")
     made = []
     for jobs in (1, 2):
-        corpus = corpus_from_video(tmp_path / f"c{jobs}", videos(clips), {"performer": "A", "emotions": ["neutral"]}, jobs=jobs)
-        report = add(corpus, videos(clips), texts=texts, jobs=jobs)
+        corpus = corpus_from_video(
+            tmp_path / f"c{jobs}", videos(clips), {"performer": "A", "emotions": ["neutral"]}, workers=Workers(jobs)
+        )
+        report = add(corpus, videos(clips), texts=texts, workers=Workers(jobs))
         assert (len(report.added), report.refused) == (3, {})
         made.append(contents(corpus.path))
     assert made[0] == made[1]
 
 
-def killed_and_repeated(clips, tmp_path, times, seed):
-    """Start the import `times` times, end each at a random moment, then let it run; compare with an undisturbed run."""
-    command = [sys.executable, "-c", "from facesynth.cli import main; main()", "corpus", "add"]
-    options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--jobs", "1", "--performer", "A"]
-    start = time.monotonic()
-    subprocess.run([*command, str(tmp_path / "whole"), *options], check=True, capture_output=True, timeout=120)
-    whole_s = time.monotonic() - start
-    rng = np.random.default_rng(seed)
-    for trial in range(times):
-        target = tmp_path / f"killed{trial // 5}"
-        process = subprocess.Popen([*command, str(target), *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            process.wait(timeout=float(rng.uniform(0.3, 1.1)) * whole_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if trial % 5 == 4 or trial == times - 1:
-            subprocess.run([*command, str(target), *options], check=True, capture_output=True, timeout=120)
-            left = {name: content for name, content in contents(target).items() if "/.part-" not in name and name[0] != "."}
-            assert left == {name: content for name, content in contents(tmp_path / "whole").items() if name[0] != "."}
-
-
-def test_killed_at_any_moment_and_run_again_gives_the_same_corpus(clips, tmp_path):
-    killed_and_repeated(clips, tmp_path, 5, seed=5)
-
-
 @pytest.mark.slow
-def test_killed_fifty_times_gives_the_same_corpus(clips, tmp_path):
-    killed_and_repeated(clips, tmp_path, 50, seed=6)
+def test_killed_fifty_times_while_following_faces_gives_the_same_corpus(clips, tmp_path, monkeypatch):
+    """Every fifth time all tracks are forgotten, so that the end also comes while a face is followed."""
+    monkeypatch.setenv("FACESYNTH_CACHE", str(tmp_path / "cache"))
+    shutil.copytree(_kept("landmarks").parent, tmp_path / "cache" / "landmarks")
+    options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--performer", "A"]
+    killed_and_repeated(options, tmp_path, 50, seed=6, forget=tmp_path / "cache" / "tracks")
 
 
 def test_another_rate_is_resampled_and_another_layout_refused(clips):

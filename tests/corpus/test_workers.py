@@ -1,9 +1,10 @@
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
-from facesynth.corpus.workers import spread
+from facesynth.corpus.workers import Workers, spread
 from facesynth.errors import FacesynthError
 
 
@@ -25,18 +26,31 @@ def die(number):
 
 
 def test_results_come_in_order():
-    assert list(spread(negative, range(20), 2, "negating")) == [-n for n in range(20)]
-    assert list(spread(negative, [], 2, "negating")) == []
+    assert list(spread(negative, range(20), Workers(2), "negating")) == [-n for n in range(20)]
+    assert list(spread(negative, [], Workers(2), "negating")) == []
     with pytest.raises(FacesynthError, match="1 or more"):
-        list(spread(negative, [1], 0, "negating"))
+        Workers(0)
 
 
 def test_what_a_dead_worker_left_is_done_again(tmp_path):
     tasks = [(number, str(tmp_path / "marker")) for number in range(6)]
-    assert list(spread(die_once, tasks, 2, "dying")) == [-n for n in range(6)]
+    assert list(spread(die_once, tasks, Workers(2), "dying")) == [-n for n in range(6)]
     assert (tmp_path / "marker").exists()
 
 
 def test_workers_that_always_die_are_one_clear_error():
     with pytest.raises(FacesynthError, match="died 3 times"):
-        list(spread(die, [1, 2], 2, "dying"))
+        list(spread(die, [1, 2], Workers(2), "dying"))
+
+
+def test_who_works_is_checked():
+    with pytest.raises(FacesynthError, match="unknown engine 'rye'; did you mean ray"):
+        Workers(1, "rye")
+    with pytest.raises(FacesynthError, match="--engine ray"):
+        Workers(1, "processes", "10.0.0.1:6379")
+
+
+def test_ray_that_is_absent_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(FacesynthError, match=r"facesynth\[ray\]"):
+        list(spread(negative, [1], Workers(1, "ray"), "negating"))

@@ -118,9 +118,7 @@ def test_wrong_motions_and_gains_are_refused(rig):
         animate(still(rig, 0), rig)
     with pytest.raises(FacesynthError, match="head_gain"):
         animate(still(rig, 5), rig, head_gain=float("nan"))
-    with pytest.raises(FacesynthError, match="ARKit name"):
-        animate(Motion(np.zeros((5, 1)), 60.0, Layout("curves", ("smirk",))), rig)
-    with pytest.raises(FacesynthError, match="landmarks"):
+    with pytest.raises(FacesynthError, match="2-D points are placed"):
         animate(Motion(np.zeros((5, 2)), 60.0, Layout("landmarks", ("chin",))), rig)
 
 
@@ -172,3 +170,10 @@ def test_gaze_is_small_and_rests():
     assert np.degrees(np.abs(gaze)).max() < 12
     assert (np.abs(np.diff(gaze, axis=0)).max(axis=1) < 1e-9).mean() > 0.9
     np.testing.assert_allclose(quiet_gaze(600, 30.0, seed=5)[::1], quiet_gaze(2400, 120.0, seed=5)[::4], atol=1e-9)
+
+
+def test_curves_none_of_which_is_arkits_keep_their_names(rig):
+    values = np.linspace(-0.5, 1.5, 5)[:, None]
+    animation = animate(Motion(values, 60.0, Layout("curves", ("smirk",))), rig)
+    assert animation.names == ("smirk",)
+    np.testing.assert_allclose(animation.weights, np.clip(values, 0, 1), atol=1e-6)

@@ -17,7 +17,7 @@ from facesynth.capture.shape import neutral_shape
 from facesynth.capture.track import Track
 from facesynth.corpus.add import VIDEO, find_recordings
 from facesynth.corpus.corpus import Corpus
-from facesynth.corpus.workers import spread
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
@@ -35,7 +35,7 @@ NOTES = (
 
 
 def corpus_from_video(
-    folder: Path, paths: Iterable[str | Path], header: Mapping[str, Any], *, face: int | None = None, jobs: int = 1
+    folder: Path, paths: Iterable[str | Path], header: Mapping[str, Any], *, face: int | None = None, workers: Workers = ALONE
 ) -> Corpus:
     """Make a corpus, still empty, for the performer of videos in files and folders: layout, rest pose and rate are theirs.
 
@@ -49,7 +49,7 @@ def corpus_from_video(
             f"{folder} is no corpus yet, and there is no video to make one from{f' ({reason})' if reason else ''};"
             " make one with `facesynth corpus new`"
         )
-    tracks = _calibration(videos, face, jobs)
+    tracks = _calibration(videos, face, workers)
     layout = landmark_layout(neutral_shape(tracks))
     return Corpus.create(folder, layout=layout, fps=tracks[0].fps, **{"notes": NOTES, **header})
 
@@ -76,10 +76,10 @@ def motion_from_video(
     return Motion(motion.frames, fps, layout, motion.head, motion.eyes), tuple(remarks)
 
 
-def _calibration(videos: Sequence[Path], face: int | None, jobs: int) -> list[Track]:
+def _calibration(videos: Sequence[Path], face: int | None, workers: Workers) -> list[Track]:
     """The tracks of some clips; those that cannot be used are passed over, unless all are."""
     places = np.unique(np.linspace(0, len(videos) - 1, CALIBRATION_CLIPS).round().astype(int))
-    results = list(spread(partial(_attempt, face=face), [videos[place] for place in places], jobs, "measuring the face"))
+    results = list(spread(partial(_attempt, face=face), [videos[place] for place in places], workers, "measuring the face"))
     tracks = [result for result in results if isinstance(result, Track)]
     if not tracks:
         raise next(result for result in results if isinstance(result, FacesynthError))

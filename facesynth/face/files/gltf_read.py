@@ -116,7 +116,7 @@ class Buffers:
             new = self._view(sparse.values.bufferView, sparse.values.byteOffset or 0, sparse.count, dtype, width)
             values[at[:, 0].astype(np.int64)] = new
         if accessor.normalized and dtype.kind in "iu":
-            values = np.maximum(values / np.iinfo(dtype).max, -1.0)
+            values = np.maximum(values / float(np.iinfo(dtype.name).max), -1.0)
         if not np.isfinite(values).all():
             raise FacesynthError(f"{self.path} holds values that are not finite; export it again")
         return values

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facesynth.errors import unknown
+from facesynth.errors import FacesynthError, unknown
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig import Rig
+from facesynth.face.rig import ARKIT_NAMES, Rig
 from facesynth.motion.motion import Motion
 
 SUFFIXES: tuple[str, ...] = (".csv", ".glb", ".npz", ".bvh")
@@ -15,10 +15,13 @@ SUFFIXES: tuple[str, ...] = (".csv", ".glb", ".npz", ".bvh")
 def write_animation(path: str | Path, animation: FaceAnimation, rig: Rig, motion: Motion | None = None) -> None:
     """Write `animation` as `.csv` (Live Link Face), `.glb`, `.npz` (with `motion` beside it) or `.bvh` (the head).
 
-    The same animation gives the same bytes. A file appears whole or not at all.
+    Curves none of which has an ARKit name are written under their own, as `.csv` or `.npz`. The same animation gives
+    the same bytes. A file appears whole or not at all.
     """
     suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
+    if not set(animation.names) & set(ARKIT_NAMES) and suffix in (".csv", ".glb"):
+        _write_plain(path, animation, motion)
+    elif suffix == ".csv":
         from facesynth.face.files.livelink import take_of, write_livelink
 
         write_livelink(path, take_of(animation))
@@ -36,3 +39,26 @@ def write_animation(path: str | Path, animation: FaceAnimation, rig: Rig, motion
         write_bvh(path, animation)
     else:
         raise unknown("animation file type", suffix or str(path), SUFFIXES)
+
+
+def require_arkit(animation: FaceAnimation, path: str | Path) -> None:
+    """FacesynthError where the built-in head cannot show the curves of an animation."""
+    if not set(animation.names) & set(ARKIT_NAMES):
+        raise FacesynthError(
+            f"{path} shows the built-in head, but the curves {', '.join(animation.names[:3])} … are not ARKit's; give a mapping"
+            " file (--mapping), or write .csv or .npz"
+        )
+
+
+def _write_plain(path: str | Path, animation: FaceAnimation, motion: Motion | None) -> None:
+    """Curves by their own names, in whatever range the method made them."""
+    from facesynth.face.files.curves import write_curves
+    from facesynth.motion.resample import resample
+
+    if Path(path).suffix.lower() != ".csv":
+        require_arkit(animation, path)
+    if motion is None or motion.layout.names != animation.names:
+        write_curves(path, animation.names, animation.weights, animation.fps)
+    else:
+        shown = motion if motion.fps == animation.fps else resample(motion, animation.fps)
+        write_curves(path, animation.names, shown.frames, animation.fps)
