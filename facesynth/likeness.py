@@ -26,6 +26,7 @@ from facesynth.speech.speech import Speech
 MOST_BYTES = 300_000_000
 """Of all cut-out pictures together: three minutes of a face 130 pixels wide, some hundred pictures in full HD."""
 BACKGROUND_FRAMES = 250
+SHORT_FRAMES = 25
 SUFFIX = ".face.npz"
 
 
@@ -44,19 +45,19 @@ def save_face(corpus: Corpus, model: Path) -> Path | None:
 
 
 def speaker_of(corpus: Corpus) -> Speaker:
-    """The pictures of a corpus, clips taken evenly as far as they fit, and its calmest clip as what they are laid over."""
+    """The pictures of a corpus, clips taken evenly as far as they fit, and a calm clip as what they are laid over."""
     videos = kept_videos(corpus)
     if not videos:
         raise FacesynthError(f"{corpus.path} keeps no video of its utterances; add the videos again with `corpus add --points`")
     shapes = {utterance_id: shapes_beside(video) for utterance_id, video in videos.items()}
-    calmest = min(shapes, key=lambda utterance_id: float(_restlessness(shapes[utterance_id].head)))
-    behind = read_footage(videos[calmest]).frames[:BACKGROUND_FRAMES]
-    height, width = behind.shape[1:3]
+    height, width = read_footage(next(iter(videos.values()))).frames.shape[1:3]
     window = lower_face_window(*_joined(list(shapes.values())), height, width)
     chosen = _fitting(shapes, window)
     cuts = [_cut(videos[name], window) for name in track(chosen, "taking pictures")]
+    calm = chosen[_calmest([shapes[name].head for name in chosen], cuts)]
+    behind = read_footage(videos[calm]).frames[:BACKGROUND_FRAMES]
     points, head = _joined([shapes[name] for name in chosen])
-    background = shapes[calmest].head.at(np.arange(len(behind)))
+    background = shapes[calm].head.at(np.arange(len(behind)))
     return Speaker(
         pictures=np.concatenate(cuts),
         corner=np.array(window[:2]),
@@ -67,7 +68,7 @@ def speaker_of(corpus: Corpus) -> Speaker:
         backgrounds=behind,
         background_linear=background.linear,
         background_shift=background.shift,
-        fps=shapes[calmest].fps,
+        fps=shapes[calm].fps,
     )
 
 
@@ -101,9 +102,16 @@ def likeness(motion: Motion, speaker: Speaker, report: Report, choice: Choice = 
         yield picture[:height, :width]
 
 
-def _restlessness(head: HeadMaps) -> float:
-    """px that the head wanders in a clip, and more where it is cut off by the clip's being very short."""
-    return float(np.ptp(head.shift, axis=0).sum()) + 100.0 * (len(head.shift) < 25)
+def _calmest(heads: list[HeadMaps], cuts: list[NDArray[np.uint8]]) -> int:
+    """The clip in which the head wanders least, of the half that is lit and coloured most like all of them together.
+
+    Very short clips, which would repeat themselves to be seen, come last.
+    """
+    colours = np.array([cut[:, ::4, ::4].mean(axis=(0, 1, 2)) for cut in cuts])
+    odd = np.linalg.norm(colours - np.median(colours, axis=0), axis=1)
+    wandering = np.array([np.ptp(head.shift, axis=0).sum() for head in heads])
+    short = np.array([len(cut) < SHORT_FRAMES for cut in cuts])
+    return int(np.lexsort((wandering, odd > np.median(odd), short))[0])
 
 
 def _joined(shapes: list[Shapes]) -> tuple[NDArray[np.float64], HeadMaps]:

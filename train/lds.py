@@ -1,6 +1,6 @@
 """Train the linear dynamical system on a corpus, judge it on sentences left out, and save it.
 
-python train/lds.py CORPUS [--config configs/lds.yaml] [-o lds.safetensors] [--seed 0]
+python train/lds.py CORPUS [--config configs/lds.yaml] [-o lds.safetensors] [--seed 0] [--plots folder/]
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
+from facesynth.likeness import save_face
 from facesynth.methods.lds.method import LDS
+from facesynth.methods.lds.plots import plot_innovations, plot_orders
 from facesynth.speech.speech import Speech
 
 CONFIG = Path(__file__).parents[1] / "configs" / "lds.yaml"
@@ -38,9 +40,16 @@ def main(arguments: list[str] | None = None) -> None:
     unit = corpus.layout.unit
     print(f"RMS error on sentences left out: {plain:.4g} {unit} without noise, {sample:.4g} with, {still:.4g} mean pose")
 
-    # Save.
+    # Save; of a speaker's followed points the pictures too, from which the real face is drawn.
     model.save(options.output)
     print(f"{options.output} written")
+    if face := save_face(train, options.output):
+        print(f"{face} written: the speaker's pictures")
+
+    # Draw what was identified: singular values, canonical correlations, histograms of the noise.
+    if options.plots:
+        plot_orders(model, options.plots / "orders.png")
+        plot_innovations(model, options.plots / "innovations.png")
 
 
 def errors(model: LDS, speech: Speech, truth: NDArray[np.float32], mean: NDArray[np.float32]) -> list[float]:
@@ -61,7 +70,7 @@ def report(model: LDS) -> None:
         print(f"|λ({name})| = {', '.join(f'{modulus:.3f}' for modulus in moduli)}")
     if facts["repaired"]:
         print(f"unstable eigenvalues moved inside and refitted: {', '.join(f'{modulus:.3f}' for modulus in facts['repaired'])}")
-    print(f"one step ahead, predicting no change: {facts['no_change_error']:.4g}")
+    print(f"squared error one step ahead of predicting no change: {facts['no_change_error']:.4g}")
     print(f"excess kurtosis of the innovations: {', '.join(f'{k:.1f}' for k in facts['kurtosis'])}")
 
 
@@ -70,6 +79,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--config", type=Path, default=CONFIG)
     parser.add_argument("-o", "--output", type=Path, default=Path("lds.safetensors"))
+    parser.add_argument("--plots", type=Path, help="folder for plots of what was identified")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

@@ -158,6 +158,33 @@ def test_steady_footage_stays_and_unsteady_is_resampled():
     assert late.frames[-1, 0, 0, 0] == 9
 
 
+def test_a_video_of_varying_rate_is_laid_on_a_steady_clock(texture, tmp_path):
+    from clips import write_video as write_pictures
+
+    grey = drawn(texture, Chewing(20))
+    times = [*range(10), *range(15, 25)]  # five pictures were dropped
+    path = write_pictures(tmp_path / "phone.mkv", np.repeat(grey[..., None], 3, axis=-1), fps=25, pts=times)
+    footage = read_footage(path)
+    assert footage.resampled
+    assert footage.fps == pytest.approx(25, rel=0.01)
+    assert len(footage.frames) == 25
+
+
+def test_pictures_lie_on_the_clock_of_the_sound():
+    frames = np.arange(10, dtype=np.uint8)[:, None, None, None] * np.ones((10, 2, 2, 3), np.uint8)
+    late = steady(frames, [0.2 + i / 25 for i in range(10)], 25.0)
+    assert (late.resampled, len(late.frames)) == (False, 15)
+    assert late.frames[:, 0, 0, 0].tolist() == [0, 0, 0, 0, 0, *range(10)]
+
+
+def test_a_rate_that_is_stated_wrongly_is_told_from_the_time_stamps():
+    frames = np.zeros((18_000, 1, 1, 3), np.uint8)
+    ntsc = 30000 / 1001
+    footage = steady(frames, (np.arange(18_000) / ntsc).tolist(), 30.0)
+    assert footage.fps == pytest.approx(ntsc, rel=1e-9)
+    assert steady(frames[:75], (np.arange(75) / 25).round(3).tolist(), 25.0).fps == 25.0
+
+
 def test_a_cut_is_found_and_talking_is_none(texture):
     smooth = cv2.GaussianBlur(texture, (0, 0), 12) * 6 % 256
     smooth = cv2.GaussianBlur(smooth, (0, 0), 6)

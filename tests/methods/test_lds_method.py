@@ -234,13 +234,16 @@ def test_bad_options_are_refused(corpus, model, options, word):
 
 
 def test_the_training_script_trains(corpus, tmp_path):
+    pytest.importorskip("matplotlib")
     script = Path(__file__).parents[2] / "train" / "lds.py"
     settings = tmp_path / "quick.yaml"
     settings.write_text("".join(f"{key}: {value}\n" for key, value in QUICK.items()))
     model = tmp_path / "model.safetensors"
     command = [sys.executable, str(script), str(corpus.path), "--config", str(settings), "-o", str(model)]
+    command += ["--plots", str(tmp_path / "plots")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "RMS error on sentences left out" in done.stdout
+    assert sorted(path.name for path in (tmp_path / "plots").iterdir()) == ["innovations.png", "orders.png"]
     assert isinstance(load(model), LDS)
 
 
