@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 if TYPE_CHECKING:
-    from facesynth.methods.method import Method
+    from collections.abc import Sequence
 
-MAIN = (
-    "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
-    "emotion_accuracy", "other_phones", "other_visemes", "train_s", "rtf", "model_mb",
-)  # fmt: skip
-"""Columns of the short table; everything is in the CSV and the JSON."""
+    from facesynth.corpus import Corpus
+    from facesynth.corpus.workers import Engine, Workers
+    from facesynth.evaluation.compare import Evaluation
+    from facesynth.evaluation.contestants import Contestant, Family
+    from facesynth.evaluation.folds import Fold
 
 
 @click.command("evaluate")
 @click.argument("corpus", type=click.Path(path_type=Path))
-@click.argument("methods", nargs=-1, required=True)
+@click.argument("methods", nargs=-1, metavar="[METHOD[:SETTINGS.yaml]]...")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the report.")
+@click.option(
+    "--family", "families", multiple=True, type=click.Path(path_type=Path), help="A file of variants; see configs/ablations."
+)
+@click.option("--folds", default=5, show_default=True, help="Splits by sentence.")
+@click.option("--given-folds", type=click.Path(path_type=Path), help="JSON of folds in place of drawn ones.")
+@click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes of each fold.")
+@click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all, evenly chosen.")
+@click.option(
+    "--from-predictions", "stored", type=click.Path(path_type=Path), help="Judge METHOD/ID.npz of this folder; train nothing."
+)
 @click.option("--no-references", is_flag=True, help="Leave out mean face, phone mean, ridge and tcn.")
-@click.option("--test-share", type=click.FloatRange(0.01, 0.9), default=0.2, show_default=True, help="Of the sentences.")
-@click.option("--test-limit", type=click.IntRange(min=2), help="At most so many held-out utterances, evenly chosen.")
+@click.option("--show", "shown", multiple=True, metavar="ID", help="Utterances for trajectories and video.")
+@click.option("--no-video", is_flag=True, help="Leave out the videos.")
+@click.option("--title", default="", help="Of the report.")
+@click.option("--workers", default=1, show_default=True, help="Processes at once; each keeps to one thread.")
+@click.option("--engine", default="processes", show_default=True, help="processes, or ray.")
+@click.option("--address", default="", help="Of a Ray cluster whose machines see the same files.")
 @click.option("--seed", default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
@@ -33,37 +45,74 @@ def evaluate(
     corpus: Path,
     methods: tuple[str, ...],
     output: Path,
-    no_references: bool,
-    test_share: float,
+    families: tuple[Path, ...],
+    folds: int,
+    given_folds: Path | None,
+    train_minutes: float | None,
     test_limit: int | None,
+    stored: Path | None,
+    no_references: bool,
+    shown: tuple[str, ...],
+    no_video: bool,
+    title: str,
+    workers: int,
+    engine: Engine,
+    address: str,
     seed: int,
     as_json: bool,
 ) -> None:
-    """Train METHODS on a part of CORPUS and judge them on sentences that they did not see.
+    """Train METHODS on a part of CORPUS, judge them on sentences that they did not see, and write a report.
 
-    A method may be a name (efase) or a settings file (efase=configs/efase_published.yaml).
+    A method is a name (efase) or a name with a settings file (efase:configs/efase_published.yaml). Interrupted, the same
+    command goes on where it was.
     """
-    from facesynth.atomic import write_text
-    from facesynth.config import load_config
     from facesynth.corpus import Corpus
-    from facesynth.evaluation.compare import evaluate as compare
-    from facesynth.evaluation.compare import reference_methods
-    from facesynth.methods.registry import create
+    from facesynth.corpus.workers import Workers
+    from facesynth.evaluation.folds import make_folds, read_folds
+    from facesynth.evaluation.report import Wish, require_drawing, write_report
 
-    train, test = Corpus.open(corpus).split(seed, test_share)
-    if test_limit and len(test) > test_limit:
-        test = test.subset([test.ids[i * len(test) // test_limit] for i in range(test_limit)])
-    candidates: dict[str, Callable[[], Method]] = {}
-    for method in methods:
-        name, _, config = method.partition("=")
-        settings = load_config(config) if config else {}
-        create(name, **settings)
-        candidates[Path(config).stem if config else name] = partial(create, name, **settings)
-    if not no_references:
-        candidates |= reference_methods()
-    result = compare(candidates, train, test, seed=seed, predictions_dir=output / "predictions")
-    for suffix, text in ((".md", result.markdown()), (".csv", result.csv()), (".json", result.json())):
-        write_text(output / f"table{suffix}", text)
-    click.echo(
-        result.json() if as_json else result.markdown([c for c in MAIN if c in {column.name for column in result.columns}])
-    )
+    team = Workers(workers, engine, address)
+    require_drawing()
+    recordings = Corpus.open(corpus)
+    known, contestants = _contestants(methods, families, references=not no_references)
+    splits: Sequence[Fold] | None = read_folds(given_folds, recordings) if given_folds else None
+    if stored is None:
+        if not methods and not families:
+            raise click.UsageError("name a method, a --family or --from-predictions")
+        splits = splits or make_folds(recordings, folds, seed, test_limit=test_limit, train_minutes=train_minutes)
+    result = _result(recordings, contestants, splits, stored, output, seed=seed, workers=team)
+    page = write_report(output, result, recordings, known, Wish(title or recordings.performer, shown, videos=not no_video))
+    if as_json:
+        click.echo(result.comparison.json())
+        return
+    click.echo(result.comparison.markdown(result.main_columns()))
+    click.echo(f"{page}: everything, for a browser; the same as CSV, JSON and LaTeX beside it")
+
+
+def _contestants(methods: Sequence[str], families: Sequence[Path], *, references: bool) -> tuple[list[Family], list[Contestant]]:
+    """Families, and every contestant: the named ones, the families' and the reference rows."""
+    from facesynth.evaluation.contestants import contestant, read_family
+    from facesynth.evaluation.contestants import references as reference_rows
+
+    read = [read_family(path) for path in families]
+    named = [contestant(spec) for spec in methods] + [one for _, variants in read for one in variants]
+    return [family for family, _ in read], named + (reference_rows() if references else [])
+
+
+def _result(
+    corpus: Corpus,
+    contestants: Sequence[Contestant],
+    splits: Sequence[Fold] | None,
+    stored: Path | None,
+    output: Path,
+    *,
+    seed: int,
+    workers: Workers,
+) -> Evaluation:
+    from facesynth.evaluation.compare import evaluate as compare
+    from facesynth.evaluation.compare import folds_beside, judge_predictions
+
+    if stored is None:
+        assert splits is not None  # noqa: S101 - told apart by the caller
+        return compare(contestants, corpus, splits, output, seed=seed, workers=workers)
+    return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, seed=seed, workers=workers)

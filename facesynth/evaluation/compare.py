@@ -2,156 +2,212 @@
 
 from __future__ import annotations
 
-import re
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any
 
 from facesynth.corpus import Corpus
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
-from facesynth.evaluation.cost import model_mb, peak_memory
-from facesynth.evaluation.dynamics import join_jump
-from facesynth.evaluation.judge import NAN, Judge, Tally
+from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, check_labels
+from facesynth.evaluation.details import Details, residual_reach
+from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
+from facesynth.evaluation.jobs import Job, read_account, run_job
+from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of
 from facesynth.evaluation.metrics import METRICS
-from facesynth.evaluation.pair import UnavailableError
-from facesynth.evaluation.predictions import load_prediction, save_prediction
+from facesynth.evaluation.paired import Difference, compare_pairs
+from facesynth.evaluation.predictions import save_prediction
 from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Column, Comparison, Row
-from facesynth.methods.method import Method
-from facesynth.motion.motion import Motion
+from facesynth.evaluation.tallies import Task, refuse_strangers, tally
+from facesynth.evaluation.versions import versions
 from facesynth.progress import track
-from facesynth.speech.speech import Speech
 
-SECOND_TAKE = "second take"
+FOLDS = "folds.json"
+PREDICTIONS = "predictions"
+MAIN = (
+    "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
+    "emotion_accuracy", "other_phones", "other_visemes", "train_s", "rtf", "model_mb",
+)  # fmt: skip
+"""Columns of the short table; everything is in the CSV and the JSON."""
 COSTS = (
     Column("train_s", "s", "low"),
+    Column("train_minutes", "min"),
     Column("rtf", "1", "low"),
     Column("peak_mb", "MB", "low"),
     Column("model_mb", "MB", "low"),
 )
 
 
-@runtime_checkable
-class Reporting(Protocol):
-    """A method with figures of its own, averaged into columns of their own."""
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything that a comparison found; computed from recordings and stored predictions alone."""
 
-    def report(self, speech: Speech) -> Mapping[str, float]:
-        """Figures (1) of what it makes of a speech."""
-        ...
+    comparison: Comparison
+    details: Mapping[str, Details]
+    """By row label."""
+    differences: tuple[Difference, ...]
+    folds: tuple[Fold, ...]
+    predictions: Path
+    accounts: Mapping[str, Sequence[Mapping[str, Any]]]
+    """By row label: what the predictions of each fold were made of; nothing for predictions made elsewhere."""
 
-
-@runtime_checkable
-class Joining(Protocol):
-    """A method that joins pieces of recorded motion."""
-
-    def joins(self, speech: Speech) -> Sequence[int]:
-        """First frames of the pieces that it joins for a speech, without frame 0."""
-        ...
-
-
-def reference_methods() -> dict[str, Callable[[], Method]]:
-    """The rows that every table has beside the second take."""
-    from facesynth.methods.baselines.mean_face import MeanFace
-    from facesynth.methods.baselines.phone_mean import PhoneMean
-    from facesynth.methods.baselines.ridge import Ridge
-    from facesynth.methods.baselines.tcn import Tcn
-
-    return {"mean face": MeanFace, "phone mean": PhoneMean, "ridge": Ridge, "tcn": Tcn}
+    def main_columns(self) -> list[str]:
+        """Columns of the short table: those of `MAIN` that some method has."""
+        scores = self.comparison.scores.values()
+        return [name for name in MAIN if any(name in row and row[name].utterances for row in scores)]
 
 
 def evaluate(
-    methods: Mapping[str, Method | Callable[[], Method]],
-    train: Corpus,
-    test: Corpus,
+    contestants: Sequence[Contestant],
+    corpus: Corpus,
+    folds: Sequence[Fold],
+    folder: str | Path,
     *,
     seed: int = 0,
-    predictions_dir: str | Path,
-) -> Comparison:
-    """Train each method, let it say every utterance of `test`, and judge what it made by the recordings.
+    workers: Workers = ALONE,
+) -> Evaluation:
+    """Train every contestant on every fold, let it speak the tested sentences, and judge what it made by the recordings.
 
-    A method that is trained already is taken as it is. Predictions are kept as `predictions_dir/LABEL/ID.npz` and
-    figures are computed from what was kept. A second take of the test utterances is a row of its own.
+    `folder` keeps folds and predictions; what it holds already, made of the same things, is not made again.
     """
-    _check(methods, train, test)
-    judge = Judge.from_recordings(train, test)
-    folder = Path(predictions_dir)
-    rows = [_second_take_row(test, judge, folder / SECOND_TAKE)]
-    for label, method in methods.items():
-        trained, train_s = _trained(method, train, seed)
-        rows.append(_row(label, trained, test, judge, folder / label, train_s=train_s, seed=seed))
-    return Comparison(_columns(rows, test), test.ids, tuple(rows), seed, judge.recorded(test), _provenance(train, test))
+    check_labels(contestants)
+    check_folds(corpus, folds)
+    folder = Path(folder)
+    write_folds(folder / FOLDS, corpus, folds)
+    predictions = folder / PREDICTIONS
+    jobs = [Job(corpus.path, predictions, one, fold, number, seed) for number, fold in enumerate(folds, 1) for one in contestants]
+    for _ in spread(run_job, jobs, workers, "training and speaking"):
+        pass
+    labels = [one.label for one in contestants]
+    return judge_predictions(corpus, folds, predictions, labels, seed=seed, workers=workers)
 
 
-def _row(label: str, method: Method, test: Corpus, judge: Judge, folder: Path, *, train_s: float, seed: int) -> Row:
-    tally, synthesis_s, speech_s = Tally(judge), 0.0, 0.0
-    with peak_memory() as peak:
-        for utterance in track(test, f"{label}: speaking", len(test)):
-            started = time.perf_counter()
-            motion = method.synthesize(utterance.speech, seed=seed)
-            synthesis_s, speech_s = synthesis_s + time.perf_counter() - started, speech_s + utterance.speech.duration_s
-            save_prediction(folder / f"{utterance.id}.npz", utterance.id, motion)
-    for utterance in track(test, f"{label}: judging", len(test)):
-        motion = load_prediction(folder / f"{utterance.id}.npz")[1]
-        tally.add(utterance, motion)
-        _add_own_figures(tally, method, utterance.speech, motion)
-    costs = {"train_s": train_s, "rtf": synthesis_s / speech_s, "peak_mb": peak.mb, "model_mb": model_mb(method)}
-    tally.reasons |= {"train_s": "it was trained before", "peak_mb": "this system does not tell peak memory"}
-    return tally.row(label, costs)
+def judge_predictions(
+    corpus: Corpus,
+    folds: Sequence[Fold],
+    predictions: str | Path,
+    labels: Sequence[str] | None = None,
+    *,
+    seed: int = 0,
+    workers: Workers = ALONE,
+) -> Evaluation:
+    """Judge stored predictions, ours or anybody's, without training anything; `labels` are all that are there otherwise."""
+    check_folds(corpus, folds)
+    predictions = Path(predictions)
+    labels = predicted_labels(predictions) if labels is None else list(labels)
+    for label in labels:
+        refuse_strangers(corpus, predictions / label)
+    tested = corpus.subset(sorted(i for fold in folds for i in fold.test))
+    pairs = _keep_second_takes(corpus, tested, predictions / SECOND_TAKE)
+    judges = judges_of(corpus, folds, tested)
+    reach = residual_reach(track(tested, "recorded movement", len(tested)))
+    tasks = [Task(corpus.path, predictions, label, tested.ids, judges, reach) for label in (SECOND_TAKE, *labels)]
+    judged = list(spread(tally, tasks, workers, "judging"))
+    accounts = {label: _accounts(predictions / label, len(folds)) for label in labels}
+    rows = [_with_costs(one.row, accounts.get(one.row.label, ()), one.costs) for one in judged]
+    rows[0] = _explain_second_take(rows[0], pairs)
+    recorded = [pair for fold in folds for pair in judges[fold.test[0]].recorded(corpus.subset(fold.test))]
+    comparison = Comparison(
+        _columns(rows, tested),
+        tested.ids,
+        tuple(rows),
+        seed,
+        confusion_of(recorded),
+        provenance(corpus, folds),
+        tuple(corpus.record(i).sentence_key for i in tested.ids),
+        tuple(corpus.record(i).emotion for i in tested.ids),
+    )
+    details = {one.row.label: one.details for one in judged}
+    return Evaluation(comparison, details, compare_pairs(comparison), tuple(folds), predictions, accounts)
 
 
-def _add_own_figures(tally: Tally, method: Method, speech: Speech, motion: Motion) -> None:
-    if isinstance(method, Joining):
-        try:
-            tally.set("join_jump", join_jump(motion, method.joins(speech)))
-        except UnavailableError as reason:
-            tally.set("join_jump", NAN, str(reason))
-    if isinstance(method, Reporting):
-        for name, value in method.report(speech).items():
-            tally.set(name, value)
+def folds_beside(predictions: str | Path, corpus: Corpus) -> tuple[Fold, ...]:
+    """The folds kept beside (or in) a folder of predictions; otherwise one fold that tests on whatever was predicted."""
+    folder = Path(predictions)
+    labels = predicted_labels(folder)
+    for path in (folder / FOLDS, folder.parent / FOLDS):
+        if path.is_file():
+            return read_folds(path, corpus)
+    predicted = {path.stem for label in labels for path in (folder / label).glob("*.npz")}
+    fold = rest_of(corpus, predicted)
+    check_folds(corpus, (fold,))
+    return (fold,)
 
 
-def _second_take_row(test: Corpus, judge: Judge, folder: Path) -> Row:
-    tally = Tally(judge)
-    for utterance in track(test, f"{SECOND_TAKE}: judging", len(test)):
-        take = second_take(test, utterance.id)
-        if take is None:
-            tally.miss("not available: no second recording of these sentences and emotions")
-            continue
-        save_prediction(folder / f"{utterance.id}.npz", utterance.id, retimed(take, utterance.speech.phones))
-        tally.add(utterance, load_prediction(folder / f"{utterance.id}.npz")[1])
-    tally.reasons |= {column.name: "a recording costs nothing to compute" for column in COSTS}
-    return tally.row(SECOND_TAKE, {})
+def predicted_labels(predictions: Path) -> list[str]:
+    """Methods that have predictions in a folder, by name."""
+    if not predictions.is_dir():
+        raise FacesynthError(f"{predictions}: no such folder; it should hold a folder of NPZ files for each method")
+    labels = sorted(path.name for path in predictions.iterdir() if path.is_dir() and any(path.glob("*.npz")))
+    if not [label for label in labels if label != SECOND_TAKE]:
+        raise FacesynthError(f"{predictions} holds no predictions; wanted METHOD/UTTERANCE.npz in the documented form")
+    return [label for label in labels if label != SECOND_TAKE]
 
 
-def _trained(method: Method | Callable[[], Method], train: Corpus, seed: int) -> tuple[Method, float]:
-    """A trained method, and how long that took (s); NaN where it came trained."""
-    made = method if isinstance(method, Method) else method()
-    if made.layout is not None:
-        return made, NAN
-    started = time.perf_counter()
-    return made.fit(train, seed=seed), time.perf_counter() - started
+def judges_of(corpus: Corpus, folds: Sequence[Fold], tested: Corpus) -> dict[str, Judge]:
+    """By tested utterance: one threshold of closure for all, and a recogniser that learned from its fold's other sentences."""
+    threshold = Judge.from_recordings(corpus.subset(()), tested).closure_threshold
+    judges: dict[str, Judge] = {}
+    for fold in track(folds, "emotion recognisers", len(folds)):
+        judge = Judge(threshold, recogniser_of(corpus.subset(fold.train)))
+        judges |= dict.fromkeys(fold.test, judge)
+    return judges
 
 
-def _columns(rows: Sequence[Row], test: Corpus) -> tuple[Column, ...]:
+def provenance(corpus: Corpus, folds: Sequence[Fold]) -> dict[str, object]:
+    """What figures were made from: recordings with their hash, folds, versions."""
+    tested = [i for fold in folds for i in fold.test]
+    return {
+        "corpus": corpus.provenance(),
+        "notes": corpus.notes,
+        "folds": len(folds),
+        "learned_minutes": [round(minutes_of(corpus, fold.train), 2) for fold in folds],
+        "tested_utterances": len(tested),
+        "tested_sentences": len({corpus.record(i).sentence_key for i in tested}),
+        "tested_minutes": round(minutes_of(corpus, tested), 2),
+        "versions": versions(),
+    }
+
+
+def _keep_second_takes(corpus: Corpus, tested: Corpus, folder: Path) -> int:
+    """Write the second take of every tested utterance that has one; returns how many."""
+    count = 0
+    for utterance in track(tested, "second takes", len(tested)):
+        take = second_take(corpus, utterance.id)
+        if take is not None:
+            save_prediction(folder / f"{utterance.id}.npz", utterance.id, retimed(take, utterance.speech.phones))
+            count += 1
+    return count
+
+
+def _explain_second_take(row: Row, count: int) -> Row:
+    reasons = {**row.reasons, **{column.name: "a recording costs nothing to compute" for column in COSTS}}
+    if not count:
+        reasons |= {metric.name: "not available: no second recording of these sentences and emotions" for metric in METRICS}
+    return replace(row, reasons=reasons)
+
+
+def _accounts(folder: Path, count: int) -> list[dict[str, Any]]:
+    return [account for number in range(1, count + 1) if (account := read_account(folder / f"fold-{number}.json"))]
+
+
+def _with_costs(row: Row, accounts: Sequence[Mapping[str, Any]], costs: Mapping[str, float]) -> Row:
+    """Means over the folds; the largest for memory. Reasons say why predictions made elsewhere have none."""
+    found = dict(costs)
+    for name in ("train_s", "train_minutes", "model_mb", "peak_mb"):
+        known = [float(one[name]) for one in accounts if one.get(name) is not None]
+        if known:
+            found[name] = max(known) if name == "peak_mb" else sum(known) / len(known)
+    missing = {column.name: "nobody kept it beside the predictions" for column in COSTS if column.name not in found}
+    return replace(row, costs=found, reasons={**missing, **row.reasons})
+
+
+def _columns(rows: Sequence[Row], tested: Corpus) -> tuple[Column, ...]:
     """Metrics, the emotion's, the joins', the methods' own figures in order of appearance, and the costs."""
-    known = [Column(metric.name, metric.unit_in(test.layout.unit), metric.best) for metric in METRICS]
+    known = [Column(metric.name, metric.unit_in(tested.layout.unit), metric.best) for metric in METRICS]
     known.append(Column("emotion_accuracy", "1", "high"))
     names = {column.name for column in known}
     own = list(dict.fromkeys(name for row in rows for name in row.values if name not in names))
     return (*known, *(Column(name, "1", "1" if name == "join_jump" else "") for name in own), *COSTS)
-
-
-def _provenance(train: Corpus, test: Corpus) -> dict[str, object]:
-    return {"train": train.provenance(), "test": test.provenance()}
-
-
-def _check(methods: Mapping[str, object], train: Corpus, test: Corpus) -> None:
-    for label in methods:
-        if label == SECOND_TAKE or not re.fullmatch(r"\w[\w .+=-]*", label):
-            raise FacesynthError(f"{label!r} cannot be a method's label, which names a folder; use letters, digits and spaces")
-    if not len(test):
-        raise FacesynthError("there is no usable utterance to test on; record more, or split otherwise")
-    both = {r.sentence_key for r in train.usable_records} & {r.sentence_key for r in test.usable_records}
-    if both:
-        raise FacesynthError(f"sentence {sorted(both)[0]!r} is learned from and tested on; split the corpus by sentence")

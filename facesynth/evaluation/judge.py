@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -18,6 +18,8 @@ from facesynth.evaluation.table import Row
 from facesynth.motion.motion import Motion
 
 NAN = float("nan")
+MOST_LEARNED = 400
+"""Utterances are enough to tell emotions apart."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +33,12 @@ class Judge:
 
     @classmethod
     def from_recordings(cls, train: Corpus, test: Corpus) -> Self:
-        """The threshold from the truth that is tested on, the recogniser from the sentences that are not."""
+        """The threshold from the truth that is tested on (in all folds), the recogniser from the sentences that are not."""
         try:
             threshold = closure_threshold((utterance.motion, utterance.speech.phones) for utterance in test)
         except UnavailableError:
             threshold = NAN
-        emotions = {record.emotion for record in train.usable_records}
-        return cls(threshold, EmotionRecogniser.fit(train) if len(emotions) > 1 else None)
+        return cls(threshold, recogniser_of(train))
 
     def figures(self, utterance: Utterance, motion: Motion) -> Iterator[tuple[str, float, str]]:
         """(metric, value, reason why it is NaN) of one utterance."""
@@ -48,33 +49,45 @@ class Judge:
             except UnavailableError as reason:
                 yield metric.name, NAN, str(reason)
 
-    def recorded(self, test: Corpus) -> Confusion | None:
-        """What the recogniser makes of the recordings themselves."""
+    def recorded(self, test: Corpus) -> list[tuple[str, str]]:
+        """(emotion, what the recogniser takes it for) of the recordings themselves."""
         if self.recogniser is None:
-            return None
+            return []
         whole = [u for u in test if not np.isnan(u.motion.frames).any(axis=1).all()]
-        return Confusion.of([u.emotion for u in whole], [self.recogniser.recognise(u.motion) for u in whole])
+        return [(u.emotion, self.recogniser.recognise(u.motion)) for u in whole]
+
+
+def recogniser_of(train: Corpus) -> EmotionRecogniser | None:
+    """A recogniser that learned from at most `MOST_LEARNED` utterances, evenly chosen; None for a single emotion."""
+    if len({record.emotion for record in train.usable_records}) < 2:
+        return None
+    step = max(1, -(-len(train) // MOST_LEARNED))
+    return EmotionRecogniser.fit(train.subset(train.ids[::step]))
+
+
+def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion | None:
+    """The confusion matrix of (asked, recognised) pairs; None where there are none."""
+    return Confusion.of(*zip(*pairs, strict=True)) if pairs else None
 
 
 class Tally:
     """Figures of one method, utterance by utterance."""
 
-    def __init__(self, judge: Judge) -> None:
-        self.judge = judge
+    def __init__(self) -> None:
         self.values: dict[str, list[float]] = {}
         self.reasons: dict[str, str] = {}
         self.emotions: list[tuple[str, str]] = []
         self.count = 0
 
-    def add(self, utterance: Utterance, motion: Motion) -> None:
+    def add(self, judge: Judge, utterance: Utterance, motion: Motion) -> None:
         """Judge one utterance."""
         self.count += 1
         try:
-            for name, value, reason in self.judge.figures(utterance, motion):
+            for name, value, reason in judge.figures(utterance, motion):
                 self.set(name, value, reason)
         except FacesynthError as error:
             raise FacesynthError(f"utterance {utterance.id!r} cannot be judged: {error}") from None
-        self._add_emotion(utterance.emotion, motion)
+        self._add_emotion(judge, utterance.emotion, motion)
 
     def miss(self, reason: str) -> None:
         """Count an utterance for which there is no motion."""
@@ -93,13 +106,12 @@ class Tally:
     def row(self, label: str, costs: Mapping[str, float]) -> Row:
         """The method's row."""
         values = {name: tuple(column + [NAN] * (self.count - len(column))) for name, column in self.values.items()}
-        confusion = Confusion.of(*zip(*self.emotions, strict=True)) if self.emotions else None
-        return Row(label, values, costs, self.reasons, confusion)
+        return Row(label, values, costs, self.reasons, confusion_of(self.emotions))
 
-    def _add_emotion(self, asked: str, motion: Motion) -> None:
-        if self.judge.recogniser is None:
+    def _add_emotion(self, judge: Judge, asked: str, motion: Motion) -> None:
+        if judge.recogniser is None:
             self.set("emotion_accuracy", NAN, "the recordings to learn from show a single emotion")
             return
-        recognised = self.judge.recogniser.recognise(motion)
+        recognised = judge.recogniser.recognise(motion)
         self.emotions.append((asked, recognised))
         self.set("emotion_accuracy", float(asked == recognised))

@@ -34,6 +34,8 @@ class Metric:
     """Which way is better, or the value that is best."""
     measure: Callable[[Case], float]
     """Raises UnavailableError where it has no value; its module's function of the same name is the definition."""
+    definition: str = ""
+    """What that function's docstring says."""
 
     def unit_in(self, layout_unit: str) -> str:
         """The unit with the layout's own in the place of `u`."""
@@ -41,7 +43,7 @@ class Metric:
 
 
 def _of_pair(name: str, unit: str, best: Literal["low", "high", "0", "1"], function: Callable[[Motion, Motion], float]) -> Metric:
-    return Metric(name, unit, best, lambda case: function(case.synthesised, case.truth))
+    return Metric(name, unit, best, lambda case: function(case.synthesised, case.truth), function.__doc__ or "")
 
 
 METRICS: tuple[Metric, ...] = (
@@ -57,12 +59,19 @@ METRICS: tuple[Metric, ...] = (
     _of_pair("velocity_error", "u/s", "low", dynamics.velocity_error),
     _of_pair("lip_gap_corr", "1", "high", lips.lip_gap_corr),
     _of_pair("lip_gap_ccc", "1", "high", lips.lip_gap_ccc),
-    Metric("closure_rate", "1", "high", lambda case: lips.closure_rate(case.synthesised, case.phones, case.closure_threshold)),
+    Metric(
+        "closure_rate",
+        "1",
+        "high",
+        lambda case: lips.closure_rate(case.synthesised, case.phones, case.closure_threshold),
+        lips.closure_rate.__doc__ or "",
+    ),
     Metric(
         "false_closure_rate",
         "1",
         "low",
         lambda case: lips.false_closure_rate(case.synthesised, case.phones, case.closure_threshold),
+        lips.false_closure_rate.__doc__ or "",
     ),
     _of_pair("lip_lag", "ms", "0", timing.lip_lag),
     _of_pair("lip_extrema_lag", "ms", "low", timing.lip_extrema_lag),

@@ -1,29 +1,73 @@
 """Synthesised motion on disk, so that every table can be computed again, and any method be judged beside ours.
 
-One NPZ file per utterance, without pickled objects:
+One NPZ file per utterance, without pickled objects, called `METHOD/ID.npz`:
 
-====================  ===============  ==============================================
-`frames`              [T, C] float32   as in `Motion`, no NaN
-`fps`                 float64          frames per second
-`layout`              text             JSON of `Layout.to_dict`
-`utterance`           text             id of the utterance in the corpus
-`head` (optional)     [T, 6] float32   rotation vector (rad) and translation (mm)
-`eyes` (optional)     [T, 3] float32   opening 0..1, gaze to the left and up (rad)
-====================  ===============  ==============================================
+========================  ===============  ==================================================
+`frames`                  [T, C] float32   as in `Motion`, no NaN
+`fps`                     number           frames per second
+`layout` (optional)       text             JSON of `Layout.to_dict`; the corpus's where absent
+`utterance` (optional)    text             id of the utterance; the file's name where absent
+`head` (optional)         [T, 6] float32   rotation vector (rad) and translation (mm)
+`eyes` (optional)         [T, 3] float32   opening 0..1, gaze to the left and up (rad)
+========================  ===============  ==================================================
+
+Beside it may lie `METHOD/ID.json`: `synthesis_s` and `speech_s` (the real-time factor), `joins` (first frames of
+the pieces of a concatenative method) and `own` (figures that the method tells of itself).
 """
 
 from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from facesynth.atomic import atomic_path
+from facesynth.atomic import atomic_path, write_text
 from facesynth.errors import FacesynthError
+from facesynth.methods.method import Method
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
+from facesynth.speech.speech import Speech
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """A method with figures of its own, averaged into columns of their own."""
+
+    def report(self, speech: Speech) -> Mapping[str, float]:
+        """Figures (1) of what it makes of a speech."""
+        ...
+
+
+@runtime_checkable
+class Joining(Protocol):
+    """A method that joins pieces of recorded motion."""
+
+    def joins(self, speech: Speech) -> Sequence[int]:
+        """First frames of the pieces that it joins for a speech, without frame 0."""
+        ...
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What is known of a prediction beside its motion."""
+
+    synthesis_s: float
+    speech_s: float
+    joins: tuple[int, ...] | None = None
+    """First frames of the pieces; None for a method that joins none."""
+    own: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, method: Method, speech: Speech, synthesis_s: float) -> Self:
+        """Ask a method."""
+        joins = tuple(map(int, method.joins(speech))) if isinstance(method, Joining) else None
+        own = {name: float(value) for name, value in method.report(speech).items()} if isinstance(method, Reporting) else {}
+        return cls(synthesis_s, speech.duration_s, joins, own)
 
 
 def save_prediction(path: str | Path, utterance_id: str, motion: Motion) -> None:
@@ -34,13 +78,35 @@ def save_prediction(path: str | Path, utterance_id: str, motion: Motion) -> None
         np.savez(file, frames=motion.frames, fps=motion.fps, layout=layout, utterance=utterance_id, **beside)
 
 
-def load_prediction(path: str | Path) -> tuple[str, Motion]:
-    """Utterance id and motion of a file in this form; FacesynthError for anything else."""
+def load_prediction(path: str | Path, layout: Layout | None = None) -> tuple[str, Motion]:
+    """Utterance id and motion of a file in this form; `layout` for files that state none. FacesynthError for others."""
     try:
         with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
-        layout = Layout.from_dict(json.loads(str(arrays["layout"])))
+        if "layout" in arrays or layout is None:
+            layout = Layout.from_dict(json.loads(str(arrays["layout"])))
         motion = Motion(arrays["frames"], float(arrays["fps"]), layout, arrays.get("head"), arrays.get("eyes"))
-        return str(arrays["utterance"]), motion
+        return str(arrays.get("utterance", Path(path).stem)), motion
     except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
         raise FacesynthError(f"{path} is no prediction that facesynth can read ({error}); see the form it wants") from None
+
+
+def write_beside(path: Path, beside: Beside) -> None:
+    """Write the JSON beside the prediction `path`, atomically."""
+    write_text(path.with_suffix(".json"), json.dumps(asdict(beside), allow_nan=False) + "\n")
+
+
+def read_beside(path: Path) -> Beside | None:
+    """What lies beside the prediction `path`; None where nothing does."""
+    beside = path.with_suffix(".json")
+    if not beside.is_file():
+        return None
+    try:
+        plain = json.loads(beside.read_text(encoding="utf-8"))
+        joins = plain.get("joins")
+        own = {str(name): float(value) for name, value in plain.get("own", {}).items()}
+        return Beside(
+            float(plain["synthesis_s"]), float(plain["speech_s"]), None if joins is None else tuple(map(int, joins)), own
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise FacesynthError(f"{beside} tells nothing of a prediction ({error}); remove it, or see the form it wants") from None

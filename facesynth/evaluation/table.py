@@ -57,7 +57,9 @@ class Score:
     def __str__(self) -> str:
         if not self.utterances:
             return "—"
-        return _number(self.mean) + (f" [{_number(self.low)}, {_number(self.high)}]" if self.low < self.high else "")
+        return short_number(self.mean) + (
+            f" [{short_number(self.low)}, {short_number(self.high)}]" if self.low < self.high else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,26 @@ class Comparison:
     recorded_emotions: Confusion | None = None
     """What the emotion classifier makes of the recordings themselves: the most that a method can reach."""
     provenance: Mapping[str, object] = field(default_factory=dict)
-    """The recordings learned from and judged by."""
+    """The recordings learned from and judged by, and what the figures were computed with."""
+    sentences: tuple[str, ...] = ()
+    """Of each utterance: equal for the same words in other emotions and takes."""
+    emotions: tuple[str, ...] = ()
+    """Of each utterance."""
 
     @cached_property
     def scores(self) -> Mapping[str, Mapping[str, Score]]:
         """By row label and column name."""
         return {row.label: {column.name: self._score(row, column.name) for column in self.columns} for row in self.rows}
+
+    def of_emotion(self, emotion: str) -> Comparison:
+        """The same methods on the utterances of one emotion; figures of the whole run are left out."""
+        chosen = [i for i, one in enumerate(self.emotions) if one == emotion]
+        rows = tuple(
+            Row(row.label, {name: tuple(values[i] for i in chosen) for name, values in row.values.items()}, {}, row.reasons)
+            for row in self.rows
+        )
+        names, sentences, emotions = (tuple(of[i] for i in chosen) for of in (self.utterances, self.sentences, self.emotions))
+        return Comparison(self.columns, names, rows, self.seed, sentences=sentences, emotions=emotions)
 
     def markdown(self, columns: Sequence[str] | None = None) -> str:
         """A table, a row per method: mean [95 % interval]; under it why figures are missing."""
@@ -108,6 +124,8 @@ class Comparison:
         plain = {
             "seed": self.seed,
             "utterances": self.utterances,
+            "sentences": self.sentences,
+            "emotions": self.emotions,
             "columns": [{"name": c.name, "unit": c.unit, "best": c.best} for c in self.columns],
             "rows": [self._row_dict(row) for row in self.rows],
             "recorded_emotions": _confusion_dict(self.recorded_emotions),
@@ -116,7 +134,7 @@ class Comparison:
         return json.dumps(plain, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     def _score(self, row: Row, column: str) -> Score:
-        if column in row.costs:
+        if column in row.costs:  # one figure of the whole run
             cost = row.costs[column]
             return Score(cost, cost, cost, 0 if math.isnan(cost) else len(self.utterances))
         values = np.array(row.values.get(column, ()), np.float64)
@@ -142,8 +160,8 @@ class Comparison:
                     missing.setdefault(f"{column.name}: {reason}", []).append(row.label)
         notes = [f"— {reason} ({', '.join(labels)})" for reason, labels in missing.items()]
         if self.recorded_emotions and any(column.name == "emotion_accuracy" for column in chosen):
-            recall = _number(self.recorded_emotions.unweighted_average_recall)
-            accuracy = _number(self.recorded_emotions.accuracy)
+            recall = short_number(self.recorded_emotions.unweighted_average_recall)
+            accuracy = short_number(self.recorded_emotions.accuracy)
             notes.append(f"The recordings themselves: emotion accuracy {accuracy}, unweighted average recall {recall}.")
         return notes
 
@@ -186,7 +204,7 @@ def _plain(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else ""
 
 
-def _number(value: float) -> str:
+def short_number(value: float) -> str:
     """Three significant digits, never in exponents."""
     if value == 0:
         return "0"

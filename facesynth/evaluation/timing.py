@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from facesynth.evaluation.lips import lip_opening
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
+from facesynth.evaluation.time_alignment import dtw_path
 from facesynth.motion.motion import Motion
 
 LONGEST_LAG_S = 0.25
@@ -47,7 +47,8 @@ def lip_extrema_lag(synthesised: Motion, truth: Motion) -> float:
     if not slopes[0].std() > 0:
         raise UnavailableError("the synthesised mouth stands still")
     radius = max(1, round(LONGEST_LAG_S * truth.fps))
-    path = _dtw_path(slopes[0] / slopes[0].std(), slopes[1] / slopes[1].std(), radius)
+    mine, yours = (slope[:, None] / slope.std() for slope in slopes)
+    path = dtw_path(mine, yours, radius)
     matched = [path[path[:, 1] == frame, 0].mean() - frame for frame in extrema]
     return float(np.abs(matched).mean()) / truth.fps * 1000
 
@@ -86,35 +87,3 @@ def _slope(signal: Array) -> Array:
     """Keogh and Pazzani's estimate: the mean of the step in and half the step across; ends repeat."""
     inner = ((signal[1:-1] - signal[:-2]) + (signal[2:] - signal[:-2]) / 2) / 2
     return np.concatenate([inner[:1], inner, inner[-1:]])
-
-
-@numba.njit(cache=True)
-def _dtw_path(mine: Array, yours: Array, radius: int) -> NDArray[np.int64]:
-    """[P, 2] pairs of frames (mine, yours) of least summed squared difference, both monotone, |i - j| <= radius.
-
-    Own routine: each cell needs its left neighbour, which no array operation expresses, and no
-    dynamic time-warping package is worth a dependency for thirty lines. Only the band is kept:
-    cell (i, j), counted from 1, lies in column j - i + radius, so that (i-1, j-1) is in the same
-    column, (i-1, j) one to the right and (i, j-1) one to the left.
-    """
-    length, width = len(mine), 2 * radius + 1
-    cost = np.full((length + 1, width + 2), np.inf)  # one column of walls on either side
-    cost[0, radius + 1] = 0.0
-    for i in range(1, length + 1):
-        for k in range(max(1, radius + 2 - i), min(width, length - i + radius + 1) + 1):
-            j = i + k - radius - 1
-            before = min(cost[i - 1, k], cost[i - 1, k + 1], cost[i, k - 1])
-            cost[i, k] = (mine[i - 1] - yours[j - 1]) ** 2 + before
-    path = np.empty((2 * length, 2), np.int64)
-    count, i, k = 0, length, radius + 1
-    while i > 0:
-        path[count, 0], path[count, 1] = i - 1, i + k - radius - 2
-        count += 1
-        across, up, left = cost[i - 1, k], cost[i - 1, k + 1], cost[i, k - 1]
-        if across <= up and across <= left:
-            i -= 1
-        elif up <= left:
-            i, k = i - 1, k + 1
-        else:
-            k -= 1
-    return path[:count][::-1]

@@ -1,0 +1,137 @@
+"""Who is compared: a method with its settings, by name, by a settings file, or a family of variants from one file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from facesynth.config import load_config
+from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.method import Method
+from facesynth.methods.registry import create, method_class
+
+SECOND_TAKE = "second take"
+"""The label of the row that is a recording."""
+REFERENCES: Mapping[str, str] = {"mean face": "mean_face", "phone mean": "phone_mean", "ridge": "ridge", "tcn": "tcn"}
+"""Label and method of the rows without which no figure can be judged."""
+FAMILY_KEYS = ("title", "method", "include", "axis", "log", "variants")
+OWN_KEYS = ("minutes", "speak", "method")
+"""Keys of a variant that are not settings of its method."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A method under a label that no other has."""
+
+    label: str
+    method: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    speak: Mapping[str, Any] = field(default_factory=dict)
+    """Options of `Method.synthesize`."""
+    minutes: float | None = None
+    """Learn from so many minutes of each fold; None: from all."""
+
+    def __post_init__(self) -> None:
+        if self.label == SECOND_TAKE or not re.fullmatch(r"\w[\w .+=,-]*", self.label) or self.label.endswith((" ", ".")):
+            raise FacesynthError(
+                f"{self.label!r} cannot be a method's label, which names a folder; use letters, digits and spaces"
+            )
+
+    def create(self) -> Method:
+        """The method, untrained; unknown settings are answered with the nearest known one."""
+        return create(self.method, **self.settings)
+
+    def plain(self) -> dict[str, Any]:
+        """Everything that decides what it makes, as JSON values; settings left out are the method's defaults."""
+        return {
+            "label": self.label,
+            "method": self.method,
+            "settings": self.create().config,
+            "speak": dict(self.speak),
+            "minutes": self.minutes,
+        }
+
+
+@dataclass(frozen=True)
+class Family:
+    """Variants of one method that a plot shows together."""
+
+    title: str
+    labels: tuple[str, ...]
+    axis: str = ""
+    """What the variants differ in: `minutes`, a setting, or nothing where they have no order."""
+    values: tuple[float, ...] = ()
+    """Each variant's place on the axis."""
+    log: bool = False
+
+
+def references() -> list[Contestant]:
+    """The rows that every table has beside the second take."""
+    return [Contestant(label, method) for label, method in REFERENCES.items()]
+
+
+def contestant(spec: str) -> Contestant:
+    """`efase`, or `efase:settings.yaml` under the name of the file."""
+    name, _, config = spec.partition(":")
+    method_class(name)
+    one = Contestant(Path(config).stem if config else name, name, load_config(config) if config else {})
+    one.create()
+    return one
+
+
+def check_labels(contestants: Sequence[Contestant]) -> None:
+    """FacesynthError where two contestants share a label."""
+    labels = [one.label.casefold() for one in contestants]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise FacesynthError(f"two methods are called {label!r}; give their settings files different names")
+
+
+def read_family(path: str | Path) -> tuple[Family, list[Contestant]]:
+    """A family and its variants from a YAML file: `title`, `method`, `variants`, and optionally `include`, `axis`, `log`.
+
+    `include` names a settings file beside it that all variants start from. `variants` maps a label to what differs:
+    settings of the method, `minutes` to learn from, `speak` for options of the synthesis, or another `method`.
+    """
+    plain = load_family(Path(path))
+    contestants = [_variant(plain, Path(path).parent, str(label), own or {}) for label, own in plain["variants"].items()]
+    check_labels(contestants)
+    axis = str(plain.get("axis") or "")
+    values = tuple(_place(one, axis) for one in contestants) if axis else ()
+    return Family(str(plain["title"]), tuple(one.label for one in contestants), axis, values, bool(plain.get("log"))), contestants
+
+
+def load_family(path: Path) -> dict[str, Any]:
+    """The file of a family, its keys checked."""
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise FacesynthError(f"{path}: cannot read a family of variants ({error})") from None
+    if not isinstance(plain, dict) or not isinstance(plain.get("variants"), dict) or not {"title", "method"} <= set(plain):
+        raise FacesynthError(f"{path}: a family needs title, method and variants, a mapping of labels to what differs")
+    for key in plain:
+        if key not in FAMILY_KEYS:
+            raise unknown("key of a family", str(key), FAMILY_KEYS)
+    return plain
+
+
+def _variant(plain: Mapping[str, Any], folder: Path, label: str, own: Mapping[str, Any]) -> Contestant:
+    base = load_config(folder / str(plain["include"])) if "include" in plain else {}
+    settings = {key: value for key, value in own.items() if key not in OWN_KEYS}
+    method = str(own.get("method", plain["method"]))
+    base = base if method == plain["method"] else {}
+    one = Contestant(label, method, {**base, **settings}, own.get("speak") or {}, own.get("minutes"))
+    one.create()
+    return one
+
+
+def _place(one: Contestant, axis: str) -> float:
+    value = one.minutes if axis == "minutes" else one.create().config.get(axis)
+    if not isinstance(value, int | float):
+        raise FacesynthError(f"variant {one.label!r} has no number for the axis {axis!r}")
+    return float(value)

@@ -1,0 +1,168 @@
+"""Where the error of a method lies: at which phones, on which points, how it is spread, and what it trades for movement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from facesynth.corpus import Utterance
+from facesynth.evaluation import geometry
+from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.pair import Array, UnavailableError, distances, paired_points
+from facesynth.evaluation.regions import lip_points
+from facesynth.evaluation.time_alignment import aligned_distances
+from facesynth.motion.motion import Motion
+from facesynth.speech.phones import SILENCE
+
+GAINS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
+"""Sizes of movement about an utterance's own mean pose at which a method's curve is drawn."""
+BINS = 61
+HISTOGRAM_SPREADS = 3.0
+"""The residual histogram reaches so many standard deviations of the recorded lip movement either way."""
+
+
+@dataclass(frozen=True)
+class PhoneError:
+    """Mean errors over the frames of one phone, in the unit of the layout."""
+
+    phone: str
+    count: int
+    """How often the phone is said."""
+    marker_error: float
+    lip_error: float
+    """Mean distance of the lip points, frame by frame."""
+    aligned_lip_error: float
+    """The same after the frames are matched in time (`aligned_distances`)."""
+
+
+@dataclass(frozen=True)
+class TradePoint:
+    """What a method would score if it moved `gain` times as much about each utterance's mean pose."""
+
+    gain: float
+    energy_ratio: float
+    lve: float
+    lve_centred: float
+
+
+@dataclass(frozen=True, eq=False)
+class Details:
+    """Where the error of one method lies."""
+
+    phones: tuple[PhoneError, ...] = ()
+    points: Array = field(default_factory=lambda: np.zeros(0))
+    """[K] mean distance of each point; NaN where the truth never has it."""
+    histogram: Array = field(default_factory=lambda: np.zeros(0))
+    """[BINS] share of the lip residuals (synthesised - recorded, each coordinate) in each bin."""
+    histogram_reach: float = 0.0
+    """Outer edges of the bins, ± in the unit of the layout; the outer bins hold what lies beyond."""
+    trade: tuple[TradePoint, ...] = ()
+
+
+def residual_reach(utterances: Iterable[Utterance]) -> float:
+    """Reach of the residual histograms of all methods: 3 standard deviations of the recorded lip movement."""
+    spreads = []
+    for utterance in utterances:
+        try:
+            lips = utterance.motion.points[:, lip_points(utterance.motion.layout)].astype(np.float64)
+        except UnavailableError:
+            return 0.0
+        seen = ~np.isnan(lips)
+        mean = np.where(seen, lips, 0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+        spreads.append(float((np.where(seen, lips - mean, 0) ** 2).sum() / max(seen.sum(), 1)))
+    return HISTOGRAM_SPREADS * float(np.sqrt(np.mean(spreads))) if spreads else 0.0
+
+
+class DetailSums:
+    """Sums over utterances, from which `Details` come."""
+
+    def __init__(self, reach: float) -> None:
+        self.reach = reach
+        self.phones: dict[str, list[Array]] = {}
+        self.points: list[tuple[Array, Array]] = []
+        self.histogram = np.zeros(BINS)
+        self.trade: list[list[tuple[float, float, float]]] = []
+
+    def add(self, utterance: Utterance, motion: Motion) -> None:
+        """Count one utterance."""
+        mine, yours = paired_points(motion, utterance.motion)
+        apart = distances(mine, yours)
+        self.points.append((np.where(np.isnan(apart), 0, apart).sum(axis=0), (~np.isnan(apart)).sum(axis=0)))
+        try:
+            lips = lip_points(motion.layout)
+        except UnavailableError:
+            return
+        aligned = aligned_distances(mine[:, lips], yours[:, lips], motion.fps)
+        self._add_phones(utterance, np.stack([_mean(apart), _mean(apart[:, lips]), aligned], axis=1))
+        self._add_residuals(mine[:, lips] - yours[:, lips])
+        self._add_trade(motion, utterance.motion)
+
+    def details(self) -> Details:
+        """What was counted."""
+        if not self.points:
+            return Details()
+        total, count = (np.sum(part, axis=0) for part in zip(*self.points, strict=True))
+        points = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+        counted = self.histogram.sum()
+        histogram = self.histogram / counted if counted else self.histogram
+        return Details(self._phone_errors(), points, histogram, self.reach, self._trade())
+
+    def _add_phones(self, utterance: Utterance, errors: Array) -> None:
+        bounds = utterance.speech.phones.frame_bounds(utterance.motion.fps)
+        for label, (start, stop) in zip(utterance.speech.phones.labels, pairwise(bounds), strict=True):
+            part = errors[start:stop]
+            if len(part) and not np.isnan(part).all(axis=0).any():
+                self.phones.setdefault(label, []).append(np.nanmean(part, axis=0))
+
+    def _add_residuals(self, residuals: Array) -> None:
+        """Residuals beyond the outer edges count in the outer bins."""
+        if self.reach > 0:
+            present = np.clip(residuals[~np.isnan(residuals)], -self.reach, self.reach)
+            self.histogram += np.histogram(present, BINS, (-self.reach, self.reach))[0]
+
+    def _add_trade(self, motion: Motion, truth: Motion) -> None:
+        try:
+            energy = energy_ratio(motion, truth)
+            self.trade.append([_trade(motion, truth, gain, energy) for gain in GAINS])
+        except UnavailableError:
+            return
+
+    def _phone_errors(self) -> tuple[PhoneError, ...]:
+        rows = [
+            PhoneError(label, len(errors), *map(float, np.mean(errors, axis=0)))
+            for label, errors in sorted(self.phones.items())
+            if label != SILENCE
+        ]
+        return tuple(sorted(rows, key=lambda row: (-row.count, row.phone)))
+
+    def _trade(self) -> tuple[TradePoint, ...]:
+        if not self.trade:
+            return ()
+        means = np.mean(self.trade, axis=0)
+        return tuple(TradePoint(gain, *map(float, row)) for gain, row in zip(GAINS, means, strict=True))
+
+
+def overall_aligned(phones: Iterable[PhoneError]) -> Mapping[str, float]:
+    """The three errors averaged over everything that is said, each phone as often as it is."""
+    rows = tuple(phones)
+    count = sum(row.count for row in rows)
+    names = ("marker_error", "lip_error", "aligned_lip_error")
+    return {name: sum(getattr(row, name) * row.count for row in rows) / count for name in names} if count else {}
+
+
+def _trade(motion: Motion, truth: Motion, gain: float, energy: float) -> tuple[float, float, float]:
+    """Energy is proportional to the gain: speeds are."""
+    mean = motion.frames.mean(axis=0, dtype=np.float64)
+    frames = (mean + gain * (motion.frames - mean)).astype(np.float32)
+    scaled = motion if gain == 1.0 else Motion(frames, motion.fps, motion.layout)
+    return gain * energy, geometry.lve(scaled, truth), geometry.lve_centred(scaled, truth)
+
+
+def _mean(apart: Array) -> Array:
+    """[T] mean over the points that the frame has; NaN where it has none."""
+    seen = ~np.isnan(apart)
+    total, count = np.where(seen, apart, 0.0).sum(axis=1), seen.sum(axis=1)
+    return np.divide(total, count, out=np.full(len(apart), np.nan), where=count > 0)

@@ -1,0 +1,155 @@
+"""A comparison as files for programs and for papers."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from facesynth.atomic import write_text
+from facesynth.evaluation.compare import Evaluation
+from facesynth.evaluation.contestants import Family
+from facesynth.evaluation.details import Details, overall_aligned
+from facesynth.evaluation.paired import statements
+from facesynth.evaluation.table import Comparison, Score, short_number
+
+WAYS = {"low": r"$\downarrow$", "high": r"$\uparrow$", "0": r"$\to 0$", "1": r"$\to 1$", "": ""}
+LATEX = {"&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}"}
+LATEX |= {"^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "²": "$^2$", "—": "--"}
+
+
+def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) -> None:
+    """Everything of the page that is a number, as CSV, JSON and LaTeX."""
+    comparison = result.comparison
+    texts = {
+        "table.md": comparison.markdown(),
+        "table.csv": comparison.csv(),
+        "table.tex": latex(comparison, result.main_columns()),
+        "utterances.csv": utterances_csv(comparison),
+        "comparisons.csv": comparisons_csv(result),
+        "phones.csv": phones_csv(result.details),
+        "emotions.csv": emotions_csv(comparison, result.main_columns()),
+        "points.csv": points_csv(result),
+        "trade.csv": trade_csv(result.details),
+        "report.json": report_json(result, families),
+    }
+    for name, text in texts.items():
+        write_text(folder / name, text)
+
+
+def latex(comparison: Comparison, columns: Sequence[str]) -> str:
+    """A table for `booktabs`: mean with the half width of the 95 % interval, the best of each column bold."""
+    chosen = [column for column in comparison.columns if column.name in columns]
+    lines = [r"\begin{tabular}{l" + "r" * len(chosen) + "}", r"\toprule"]
+    heads = [escape(c.name) + (f" ({escape(c.unit)})" if c.unit != "1" else "") + " " + WAYS[c.best] for c in chosen]
+    lines += [" & ".join(["", *(head.strip() for head in heads)]) + r" \\", r"\midrule"]
+    best = {column.name: best_labels(comparison, column.name, column.best) for column in chosen}
+    for row in comparison.rows:
+        cells = [_latex_cell(comparison.scores[row.label][c.name], bold=row.label in best[c.name]) for c in chosen]
+        lines.append(" & ".join([escape(row.label), *cells]) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
+
+
+def best_labels(comparison: Comparison, figure: str, best: str) -> set[str]:
+    """Rows with the best mean of a figure; none where no way is better. The second take does not compete."""
+    means = {row.label: comparison.scores[row.label][figure].mean for row in comparison.rows[1:]}
+    known = {label: _badness(mean, best) for label, mean in means.items() if math.isfinite(mean)}
+    return {label for label, bad in known.items() if bad <= min(known.values())} if best else set()
+
+
+def escape(text: str) -> str:
+    """Text with LaTeX's special characters taken literally."""
+    return re.sub("[" + re.escape("".join(LATEX)) + "]", lambda found: LATEX[found[0]], text)
+
+
+def utterances_csv(comparison: Comparison) -> str:
+    """A line for each method and utterance, a column for each figure."""
+    names = [c.name for c in comparison.columns if any(c.name in row.values for row in comparison.rows)]
+    lines = [("method", "utterance", "sentence", "emotion", *names)]
+    for row in comparison.rows:
+        for i, about in enumerate(zip(comparison.utterances, comparison.sentences, comparison.emotions, strict=True)):
+            lines.append((row.label, *about, *(plain(row.values[n][i]) if n in row.values else "" for n in names)))
+    return to_csv(lines)
+
+
+def comparisons_csv(result: Evaluation) -> str:
+    """A line for each pair of methods and figure."""
+    names = ("figure", "unit", "first", "second", "mean", "low", "high", "sentences", "p", "p_holm", "distinguishable")
+    lines = [[_cell(getattr(one, name)) for name in names] for one in result.differences]
+    return to_csv([(*names[:4], "first_is_worse_by", *names[5:]), *lines])
+
+
+def phones_csv(details: Mapping[str, Details]) -> str:
+    """A line for each method and phone."""
+    names = ("phone", "count", "marker_error", "lip_error", "aligned_lip_error")
+    lines = [[label, *(_cell(getattr(row, name)) for name in names)] for label, one in details.items() for row in one.phones]
+    return to_csv([("method", *names), *lines])
+
+
+def emotions_csv(comparison: Comparison, columns: Sequence[str]) -> str:
+    """A line for each emotion, method and figure."""
+    lines: list[Sequence[Any]] = [("emotion", "method", "figure", "mean", "low", "high", "utterances")]
+    for emotion in dict.fromkeys(comparison.emotions):
+        for label, scores in comparison.of_emotion(emotion).scores.items():
+            chosen = [(n, s) for n, s in scores.items() if n in columns and s.utterances]
+            lines += [(emotion, label, n, plain(s.mean), plain(s.low), plain(s.high), s.utterances) for n, s in chosen]
+    return to_csv(lines)
+
+
+def points_csv(result: Evaluation) -> str:
+    """A line for each point of the face and method: its mean error."""
+    lines = [(label, k, plain(float(value))) for label, one in result.details.items() for k, value in enumerate(one.points)]
+    return to_csv([("method", "point", "mean_error"), *lines])
+
+
+def trade_csv(details: Mapping[str, Details]) -> str:
+    """The curves of error against movement."""
+    names = ("gain", "energy_ratio", "lve", "lve_centred")
+    lines = [[label, *(plain(getattr(point, name)) for name in names)] for label, one in details.items() for point in one.trade]
+    return to_csv([("method", *names), *lines])
+
+
+def report_json(result: Evaluation, families: Sequence[Family]) -> str:
+    """Everything, for programs."""
+    whole: dict[str, Any] = json.loads(result.comparison.json())
+    whole["overall"] = {label: dict(overall_aligned(one.phones)) for label, one in result.details.items()}
+    whole["comparisons"] = [vars(one) | {"distinguishable": one.distinguishable} for one in result.differences]
+    whole["statements"] = dict(statements(result.differences))
+    whole["folds"] = [{"train": fold.train, "test": fold.test} for fold in result.folds]
+    whole["made_of"] = {label: list(accounts) for label, accounts in result.accounts.items()}
+    whole["families"] = [vars(family) for family in families]
+    return json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def to_csv(lines: Iterable[Sequence[Any]]) -> str:
+    """Lines of cells as CSV with Unix line ends."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+def plain(value: float) -> str:
+    """A number for a file; nothing for NaN."""
+    return f"{value:.8g}" if math.isfinite(value) else ""
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return plain(value) if isinstance(value, float) else str(value)
+
+
+def _badness(mean: float, best: str) -> float:
+    return {"low": mean, "high": -mean}.get(best, abs(mean - float(best if best in ("0", "1") else 0)))
+
+
+def _latex_cell(score: Score, *, bold: bool) -> str:
+    if not score.utterances:
+        return "--"
+    text = rf"\textbf{{{short_number(score.mean)}}}" if bold else short_number(score.mean)
+    return text + (rf" {{\scriptsize$\pm${short_number((score.high - score.low) / 2)}}}" if score.low < score.high else "")

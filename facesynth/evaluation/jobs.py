@@ -1,0 +1,160 @@
+"""One method on one fold: train, speak the tested sentences, keep what came out. Killed at any moment, it goes on there."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from facesynth.atomic import write_text
+from facesynth.corpus import Corpus, Utterance
+from facesynth.errors import FacesynthError
+from facesynth.evaluation.contestants import Contestant
+from facesynth.evaluation.cost import MB, peak_memory
+from facesynth.evaluation.folds import Fold, minutes_of, some_minutes
+from facesynth.evaluation.predictions import Beside, read_beside, save_prediction, write_beside
+from facesynth.evaluation.versions import versions
+from facesynth.methods.method import Method
+from facesynth.methods.registry import load
+
+
+@dataclass(frozen=True)
+class Job:
+    """One method on one fold."""
+
+    corpus: Path
+    predictions: Path
+    """Folder that holds a folder for each method."""
+    contestant: Contestant
+    fold: Fold
+    number: int
+    """Of the fold, from 1."""
+    seed: int
+
+    @property
+    def folder(self) -> Path:
+        """Where predictions are kept."""
+        return self.predictions / self.contestant.label
+
+    @property
+    def account(self) -> Path:
+        """JSON: what the predictions of this fold were made of, and what they cost."""
+        return self.folder / f"fold-{self.number}.json"
+
+    @property
+    def model(self) -> Path:
+        """The trained model while the fold is not finished."""
+        return self.folder / f".fold-{self.number}.safetensors"
+
+    def made_of(self, corpus: Corpus) -> str:
+        """sha256 of all that decides the predictions: method, settings, seed, recordings."""
+        learned, tested = (corpus.subset(ids).provenance()["sha256"] for ids in (self.learned(corpus), self.fold.test))
+        facts = [self.contestant.plain(), self.seed, learned, tested]
+        return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+    def learned(self, corpus: Corpus) -> tuple[str, ...]:
+        """Ids of the utterances to learn from."""
+        minutes = self.contestant.minutes
+        return self.fold.train if minutes is None else some_minutes(corpus, self.fold.train, minutes, self.seed)
+
+
+def run_job(job: Job) -> str:
+    """Do what is not done yet; returns the label.
+
+    One thread, whatever else runs: sums of floating-point numbers depend on how many threads share them, and figures
+    must not depend on the number of workers.
+    """
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            _run(job, Corpus.open(job.corpus))
+    except FacesynthError as error:
+        raise FacesynthError(f"{job.contestant.label}, fold {job.number}: {error}") from None
+    finally:
+        torch.set_num_threads(before)
+    return job.contestant.label
+
+
+def _run(job: Job, corpus: Corpus) -> None:
+    made_of, account = job.made_of(corpus), read_account(job.account)
+    if account.get("made_of") != made_of:
+        _forget(job, account)
+        account = {"made_of": made_of, "contestant": job.contestant.plain(), "seed": job.seed, "versions": versions()}
+    if account.get("done"):
+        return
+    if not job.model.is_file():
+        account |= _train(job, corpus)
+        _write(job.account, account)
+    method = load(job.model)
+    with peak_memory() as peak:
+        _speak(job, corpus, method)
+    _write(job.account, account | {"peak_mb": peak.mb if peak.mb == peak.mb else None, "done": True})
+    job.model.unlink()
+
+
+def _train(job: Job, corpus: Corpus) -> dict[str, Any]:
+    learned = job.learned(corpus)
+    method = job.contestant.create()
+    started = time.perf_counter()
+    method.fit(corpus.subset(learned), seed=job.seed)
+    train_s = time.perf_counter() - started
+    method.save(job.model)
+    return {
+        "train_s": train_s,
+        "train_minutes": minutes_of(corpus, learned),
+        "model_mb": job.model.stat().st_size / MB,
+        "tested": list(job.fold.test),
+    }
+
+
+def _speak(job: Job, corpus: Corpus, method: Method) -> None:
+    """Every tested utterance that has no prediction yet; the model is warm before its time is taken."""
+    left = [i for i in job.fold.test if not (read_beside(_path(job, i)) and _path(job, i).is_file())]
+    for position, utterance_id in enumerate(left):
+        utterance = corpus[utterance_id]
+        if position == 0:
+            method.synthesize(utterance.speech, seed=job.seed, **job.contestant.speak)
+        _speak_one(job, method, utterance)
+
+
+def _speak_one(job: Job, method: Method, utterance: Utterance) -> None:
+    started = time.perf_counter()
+    motion = method.synthesize(utterance.speech, seed=job.seed, **job.contestant.speak)
+    synthesis_s = time.perf_counter() - started
+    path = _path(job, utterance.id)
+    save_prediction(path, utterance.id, motion)
+    write_beside(path, Beside.of(method, utterance.speech, synthesis_s))
+
+
+def read_account(path: Path) -> dict[str, Any]:
+    """What is known of a fold's predictions; empty where nothing is."""
+    try:
+        plain = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return plain if isinstance(plain, dict) else {}
+
+
+def _path(job: Job, utterance_id: str) -> Path:
+    return job.folder / f"{utterance_id}.npz"
+
+
+def _forget(job: Job, account: dict[str, Any]) -> None:
+    """Remove what other settings, recordings or folds left behind, so that nothing of it is taken for new."""
+    for utterance_id in {*job.fold.test, *account.get("tested", ())}:
+        for path in (_path(job, utterance_id), _path(job, utterance_id).with_suffix(".json")):
+            path.unlink(missing_ok=True)
+    job.model.unlink(missing_ok=True)
+    job.account.unlink(missing_ok=True)
+
+
+def _write(path: Path, account: dict[str, Any]) -> None:
+    write_text(path, json.dumps(account, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

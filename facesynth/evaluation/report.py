@@ -1,0 +1,184 @@
+"""The report: one page for a browser that needs no network, and the same as files."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from facesynth.atomic import write_text
+from facesynth.corpus import Corpus
+from facesynth.errors import FacesynthError
+from facesynth.evaluation import figures
+from facesynth.evaluation.compare import Evaluation
+from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Family
+from facesynth.evaluation.exports import best_labels, write_exports
+from facesynth.evaluation.face_video import worst_shown, write_side_by_side
+from facesynth.evaluation.family_figure import family_figure
+from facesynth.evaluation.metrics import METRICS
+from facesynth.evaluation.pair import Array
+from facesynth.evaluation.paired import statements
+from facesynth.evaluation.point_face import PointFace
+from facesynth.evaluation.table import ARROWS, Comparison
+from facesynth.evaluation.tallies import read_pair
+from facesynth.evaluation.trajectories import MOST_SHOWN, trajectory_figure
+from facesynth.evaluation.verdict import verdicts
+from facesynth.motion.motion import Motion
+from facesynth.progress import track
+
+PAGE = "index.html"
+MOST_PANELS = 5
+SHAPE_FRAMES = 4000
+"""Recorded frames from which the shape at rest comes."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """How a page is wanted."""
+
+    title: str
+    shown: tuple[str, ...] = ()
+    """Ids of the utterances to draw; none: the median one and the worst one of the first method."""
+    videos: bool = True
+
+
+def require_drawing() -> None:
+    """FacesynthError where the packages that draw the page are not installed; said before hours of training."""
+    for package in ("matplotlib", "jinja2", "PIL"):
+        if find_spec(package) is None:
+            raise FacesynthError(f"a report needs {package}; install it with: pip install 'facesynth[report]'")
+
+
+def write_report(folder: str | Path, result: Evaluation, corpus: Corpus, families: Sequence[Family], wish: Wish) -> Path:
+    """Write the page and its files into a folder; returns the page."""
+    from jinja2 import Environment, PackageLoader
+
+    require_drawing()
+    folder = Path(folder)
+    write_exports(folder, result, families)
+    page = Environment(loader=PackageLoader("facesynth.evaluation", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    text = page.get_template("report.html").render(_contents(result, corpus, families, wish))
+    write_text(folder / PAGE, text)
+    return folder / PAGE
+
+
+def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wish: Wish) -> dict[str, Any]:
+    comparison, unit = result.comparison, corpus.layout.unit
+    recorded = _some_frames(corpus, comparison.utterances)
+    face = PointFace.of(corpus.layout, recorded)
+    matrices = {row.label: row.confusion for row in comparison.rows if row.confusion}
+    if comparison.recorded_emotions:
+        matrices = {"recorded": comparison.recorded_emotions, **matrices}
+    return {
+        "wish": wish,
+        "synthetic": corpus.synthetic,
+        "main": table(comparison, result.main_columns()),
+        "whole": table(comparison, [column.name for column in comparison.columns]),
+        "notes": comparison.markdown(result.main_columns()).split("\n\n")[1:],
+        "verdicts": verdicts(result),
+        "statements": statements(result.differences),
+        "differences": result.differences,
+        "emotions": _by_emotion(comparison, result.main_columns()),
+        "phones": _phones(result),
+        "trade": figures.trade_figure(result.details, (*REFERENCES, SECOND_TAKE), unit),
+        "face": figures.face_figure(result.details, face, unit),
+        "histograms": figures.histogram_figure(result.details, unit),
+        "confusions": figures.confusion_figure(matrices),
+        "families": [(family, family_figure(comparison, family)) for family in families],
+        "shown": list(_shown(result, corpus, face, wish)),
+        "provenance": comparison.provenance,
+        "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
+        "definitions": {m.name: " ".join(m.definition.split()) for m in METRICS},
+        "unit": unit,
+    }
+
+
+def table(comparison: Comparison, columns: Sequence[str]) -> dict[str, Any]:
+    """Heads and rows of cells: text, interval, whether it is the best."""
+    chosen = [column for column in comparison.columns if column.name in columns]
+    best = {column.name: best_labels(comparison, column.name, column.best) for column in chosen}
+    rows = []
+    for row in comparison.rows:
+        scores = [comparison.scores[row.label][column.name] for column in chosen]
+        cells = [
+            (*str(s).partition(" [")[::2], row.label in best[c.name], s.utterances) for c, s in zip(chosen, scores, strict=True)
+        ]
+        rows.append((row.label, cells))
+    heads = [(column.name, "" if column.unit == "1" else column.unit, ARROWS[column.best]) for column in chosen]
+    return {"heads": heads, "rows": rows}
+
+
+def _by_emotion(comparison: Comparison, columns: Sequence[str]) -> dict[str, dict[str, Any]]:
+    found = dict.fromkeys(sorted(comparison.emotions))
+    if len(found) < 2:
+        return {}
+    quality = [name for name in columns if any(name in row.values for row in comparison.rows)]
+    return {emotion: table(comparison.of_emotion(emotion), quality) for emotion in found}
+
+
+def _phones(result: Evaluation) -> dict[str, Any]:
+    """For each phone its count, and for each method the lip error before and after alignment in time."""
+    rows: dict[str, dict[str, tuple[float, float]]] = {}
+    counts: dict[str, int] = {}
+    for label, one in result.details.items():
+        for phone in one.phones:
+            rows.setdefault(phone.phone, {})[label] = (phone.lip_error, phone.aligned_lip_error)
+            counts[phone.phone] = max(counts.get(phone.phone, 0), phone.count)
+    order = sorted(rows, key=lambda phone: (-counts[phone], phone))
+    return {
+        "labels": [label for label, one in result.details.items() if one.phones],
+        "rows": [(p, counts[p], rows[p]) for p in order],
+    }
+
+
+def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish) -> Iterator[dict[str, str]]:
+    labels = [row.label for row in result.comparison.rows]
+    order = sorted(labels, key=lambda label: (label == SECOND_TAKE, label in REFERENCES))
+    worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
+    for utterance_id in track(wish.shown or typical(result), "pictures"):
+        pairs = {label: pair for label in order if (pair := read_pair(corpus, result.predictions, label, utterance_id))}
+        utterance = corpus[utterance_id]
+        motions = {label: pair[1] for label, pair in pairs.items()}
+        drawn = {label: motions[label] for label in labels if label in islice(motions, MOST_SHOWN)}
+        yield {
+            "id": utterance_id,
+            "text": utterance.speech.text,
+            "emotion": utterance.emotion,
+            "trajectories": trajectory_figure(utterance, drawn, labels),
+            "video": _video(utterance_id, corpus, dict(islice(motions.items(), MOST_PANELS)), face, worst) if wish.videos else "",
+        }
+
+
+def _video(utterance_id: str, corpus: Corpus, motions: Mapping[str, Motion], face: PointFace, worst: float) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "side_by_side.mp4"
+        write_side_by_side(path, corpus[utterance_id], motions, face, worst)
+        return figures.data_uri("video/mp4", path.read_bytes())
+
+
+def typical(result: Evaluation) -> tuple[str, ...]:
+    """The utterances at the median and at the top of the first method's lip error."""
+    comparison = result.comparison
+    first = comparison.rows[min(1, len(comparison.rows) - 1)]
+    values = np.asarray(first.values.get("lve", first.values.get("marker_error", ())), np.float64)
+    known = np.flatnonzero(~np.isnan(values))
+    if not len(known):
+        return comparison.utterances[:1]
+    order = known[np.argsort(values[known], kind="stable")]
+    return tuple(dict.fromkeys(comparison.utterances[i] for i in (order[len(order) // 2], order[-1])))
+
+
+def _some_frames(corpus: Corpus, ids: Sequence[str]) -> Array:
+    """[T, C] recorded frames of a few of the tested utterances."""
+    found: list[Array] = []
+    for utterance_id in ids[:: max(1, len(ids) // 12)]:
+        found.append(corpus[utterance_id].motion.frames.astype(np.float64))
+        if sum(map(len, found)) > SHAPE_FRAMES:
+            break
+    return np.concatenate(found)
