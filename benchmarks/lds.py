@@ -13,7 +13,7 @@ import numpy as np
 from facesynth.atomic import write_text
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
-from facesynth.methods.lds.crossvalidation import cross_validate, table
+from facesynth.methods.lds.crossvalidation import Errors, judge_fold, table
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 
@@ -33,9 +33,12 @@ def main() -> None:
         places = np.linspace(0, len(corpus) - 1, options.limit).round().astype(int)
         corpus = corpus.subset([corpus.ids[place] for place in places])
     configs = {name: load_config(CONFIGS / file) for name, file in NAMES.items()}
-    text = table(cross_validate(corpus, configs, options.folds), corpus.layout.unit)
-    write_text(options.output / "table.md", text + "\n")
-    print(text)
+    errors = Errors()
+    for number, (train, test) in enumerate(corpus.folds(options.folds), start=1):
+        judge_fold(errors, configs, train, test)
+        head = f"{len(corpus)} utterances, {number} of {options.folds} folds\n\n"
+        write_text(options.output / "table.md", head + table(errors, corpus.layout.unit) + "\n")
+    print(table(errors, corpus.layout.unit))
     model = LDS(**configs["LDS"]).fit(corpus)
     plot_orders(model, options.output / "orders.png")
     plot_innovations(model, options.output / "innovations.png")

@@ -62,13 +62,18 @@ def cross_validate(corpus: Corpus, configs: Mapping[str, Mapping[str, Any]], fol
     """Mean shape, ridge from log-mel, and for each named config of `LDS` the system and ridge from its features."""
     errors = Errors()
     for train, test in corpus.folds(folds, seed):
-        mean, mel = MeanFace().fit(train), Ridge().fit(train, seed=seed)
-        for utterance in test:
-            errors.add("mean shape", _frames(mean.synthesize(utterance.speech)), _frames(utterance.motion))
-            errors.add("ridge, log-mel", _frames(mel.synthesize(utterance.speech)), _frames(utterance.motion))
-        for name, config in configs.items():
-            _judge(errors, name, LDS(**config).fit(train, seed=seed), train, test)
+        judge_fold(errors, configs, train, test, seed)
     return errors
+
+
+def judge_fold(errors: Errors, configs: Mapping[str, Mapping[str, Any]], train: Corpus, test: Corpus, seed: int = 0) -> None:
+    """What `cross_validate` does with one fold, added to `errors`."""
+    mean, mel = MeanFace().fit(train), Ridge().fit(train, seed=seed)
+    for utterance in test:
+        errors.add("mean shape", _frames(mean.synthesize(utterance.speech)), _frames(utterance.motion))
+        errors.add("ridge, log-mel", _frames(mel.synthesize(utterance.speech)), _frames(utterance.motion))
+    for name, config in configs.items():
+        _judge(errors, name, LDS(**config).fit(train, seed=seed), train, test)
 
 
 def table(errors: Errors, unit: str) -> str:

@@ -12,7 +12,7 @@ from facesynth.methods.lds.stochastic import noise_rows, predictor_space, realis
 from facesynth.methods.lds.system import Array, Clip, Deterministic
 
 FOLDS = 4
-MOST_FRAMES = 20_000
+MOST_FRAMES = 6_000
 """Of longer recordings, evenly spaced clips with about this many frames decide."""
 
 

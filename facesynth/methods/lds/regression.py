@@ -9,14 +9,18 @@ from scipy.linalg import qr
 
 from facesynth.methods.lds.system import Array
 
+GATHERED = 4
+"""Blocks are gathered until there are so many rows for each column: short ones would be mostly factored in vain."""
+
 
 def triangle(blocks: Iterable[Array]) -> Array:
     """R of the QR decomposition of row blocks [rows, columns] stacked: the root of their Gram matrix, to full precision."""
-    remaining = iter(blocks)
-    r = _r(next(remaining))
-    for block in remaining:
-        r = _r(np.vstack([r, block]))
-    return r
+    waiting: list[Array] = []
+    for block in blocks:
+        waiting.append(block)
+        if sum(map(len, waiting)) >= GATHERED * block.shape[1]:
+            waiting = [_r(np.vstack(waiting))]
+    return _r(np.vstack(waiting))
 
 
 def _r(rows: Array) -> Array:
