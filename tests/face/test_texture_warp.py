@@ -94,6 +94,26 @@ def test_interpolation_is_linear(mesh):
     assert (drawn[~covered] == 0).all()
 
 
+@pytest.mark.parametrize("amount", [0.0, 1.5, 9.0])
+def test_both_ways_of_filling_agree(mesh, amount):
+    """A compiled loop on the processor, torch elsewhere; folded and level triangles included."""
+    warper = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
+    vertices = torch.from_numpy(np.stack([moved(mesh, amount, seed) for seed in (1, 2)])).float()
+    values = torch.rand(2, vertices.shape[1], 3, generator=torch.Generator().manual_seed(0))
+    if amount > 2:  # where triangles overlap, which of them counts is free: only what is covered is compared
+        values = torch.ones_like(values)
+    torch.testing.assert_close(
+        warper.interpolate(vertices, values), warper.interpolate_by_spans(vertices, values), atol=2e-3, rtol=0
+    )
+
+
+def test_gradients_pass_through_the_warp(mesh, picture):
+    target = torch.from_numpy(moved(mesh, 1.0))[None].float().requires_grad_()
+    warper = PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), HEIGHT, WIDTH)
+    warper(picture, torch.from_numpy(mesh.reference)[None].float(), target).square().mean().backward()
+    assert target.grad.abs().max() > 0
+
+
 def test_outside_the_mesh_nothing_changes(mesh, picture):
     source, target = moved(mesh, 1.0, 1), moved(mesh, 1.0, 2)
     drawn = warp(mesh, picture, source, target)

@@ -9,8 +9,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-EDGE = 1e-4
-"""px: pixels this far outside a triangle still belong to it, so that rounding leaves no holes along edges."""
+from facesynth.face.texture.filling import EDGE, filled
 
 
 class PiecewiseAffineWarp(nn.Module):
@@ -33,6 +32,16 @@ class PiecewiseAffineWarp(nn.Module):
 
     def interpolate(self, vertices: Tensor, values: Tensor) -> Tensor:
         """Values [N, V, D] at vertices [N, V, 2], linear in each triangle, at every pixel: [N, H, W, D]; 0 outside the mesh.
+
+        On a processor a compiled loop fills the triangles; on other devices, and where gradients are wanted, torch does.
+        """
+        if vertices.device.type != "cpu" or vertices.requires_grad or values.requires_grad:
+            return self.interpolate_by_spans(vertices, values)
+        arrays = (tensor.numpy() for tensor in (vertices, values, self.triangles))
+        return torch.from_numpy(filled(*arrays, self.height, self.width))
+
+    def interpolate_by_spans(self, vertices: Tensor, values: Tensor) -> Tensor:
+        """What `interpolate` gives, in operations of torch alone.
 
         Each triangle is cut into spans of pixels, row by row; a value is linear along a span, so that a pixel costs
         one multiplication and one addition and no search for its triangle.
