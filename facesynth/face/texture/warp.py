@@ -37,8 +37,8 @@ class PiecewiseAffineWarp(nn.Module):
         """
         if vertices.device.type != "cpu" or vertices.requires_grad or values.requires_grad:
             return self.interpolate_by_spans(vertices, values)
-        arrays = (tensor.numpy() for tensor in (vertices, values, self.triangles))
-        return torch.from_numpy(filled(*arrays, self.height, self.width))
+        triangles = self.triangles.numpy()
+        return torch.from_numpy(filled(vertices.numpy(), values.numpy(), triangles, self.height, self.width))
 
     def interpolate_by_spans(self, vertices: Tensor, values: Tensor) -> Tensor:
         """What `interpolate` gives, in operations of torch alone.
