@@ -54,6 +54,8 @@ def train(
         return
     kind = "synthetic performer" if recordings.synthetic else "performer"
     click.echo(f"{method} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
+    if moved := model.facts.get("repaired"):
+        click.echo(f"unstable: eigenvalues of modulus {', '.join(f'{m:.3f}' for m in moved)} were moved inside, the rest refitted")
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

@@ -89,6 +89,30 @@ def test_unstable_eigenvalues_are_moved_inside_and_reported():
     np.testing.assert_array_equal(same, rotation / 2)
 
 
+def test_an_unstable_fit_is_repaired_refitted_and_reported():
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        clip = Clip(rng.normal(size=(120, 1)), rng.normal(size=(120, 2)).cumsum(axis=0).cumsum(axis=0))
+        system = identify([clip.centred()], 5, (3, 2))
+        if system.repaired:
+            break
+    assert min(system.repaired) >= 1
+    assert max(system.poles()["A_d"]) < 1
+
+
+def test_inputs_are_fitted_again_for_moved_eigenvalues():
+    truth = random_truth(2)
+    clip = _noiseless(truth, 300, 0)
+    unstable = 1.02 * truth.deterministic.A / np.abs(np.linalg.eigvals(truth.deterministic.A)).max()
+    A, moved = stabilised(unstable)
+    assert moved
+    before, starts = fit_inputs(unstable, truth.deterministic.C, [clip], None)
+    after, again = fit_inputs(A, truth.deterministic.C, [clip], None)
+    kept = Deterministic(A, before.B, before.C, before.D)
+    errors = [np.abs(clip.y - system.simulate(clip.u, start[0])).mean() for system, start in ((kept, starts), (after, again))]
+    assert errors[1] < 0.9 * errors[0]
+
+
 def test_inverse_system_returns_the_innovations():
     truth = random_truth(0)
     e = np.random.default_rng(0).normal(size=(200, 3))
