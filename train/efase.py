@@ -1,6 +1,9 @@
 """Train eFASE on a corpus, speak its held-out sentences, print the errors, save the model.
 
 python train/efase.py CORPUS -o efase.safetensors [--config configs/efase.yaml] [penalty=3 …]
+
+learn=true with configs/efase_soft.yaml learns the weights of the cost and a linear audio metric by gradient through the
+soft search, on sentences that are neither in its database nor tested on, before the model is fitted to all of them.
 """
 
 import argparse
@@ -8,7 +11,9 @@ from pathlib import Path
 
 from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
+from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, marker_error
+from facesynth.methods.efase.learning import apply, learn
 from facesynth.methods.efase.method import Efase
 
 
@@ -23,23 +28,36 @@ def main() -> None:
 
     # load
     corpus = Corpus.open(options.corpus)
-    learn, held_out = corpus.split(options.seed)
+    recorded, held_out = corpus.split(options.seed)
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
+    # learn
+    wanted = settings.pop("learn", False)
+    learned = learn(recorded, settings, seed=options.seed) if wanted else None
+    if learned:
+        settings |= learned.settings
+        print(f"learned in {len(learned.errors) - 1} rounds, validation error {learned.improvement:.1%} less")
+        print(" ".join(f"{name}={value:.4g}" for name, value in learned.settings.items()))
+
     # fit
-    model = Efase.from_config(settings).fit(learn, seed=options.seed)
-    print(f"{len(learn)} utterances, {len(model.facts['names'])} nodes, {model.facts['unusable_phones']} phones unusable")
+    model = Efase.from_config(settings).fit(recorded, seed=options.seed)
+    if learned:
+        apply(learned, model)
+    print(f"{len(recorded)} utterances, {len(model.facts['names'])} nodes, {model.facts['unusable_phones']} phones unusable")
 
     # evaluate
-    unit = corpus.layout.unit
+    unit, lips, energies = corpus.layout.unit, [], []
     for utterance in held_out:
         made = model.synthesize(utterance.speech, seed=options.seed)
         shares = model.report(utterance.speech)
+        lips.append(lve(made, utterance.motion))
+        energies.append(energy_ratio(made, utterance.motion))
         print(
             f"{utterance.id}: marker error {marker_error(made, utterance.motion):.3f} {unit}, "
-            f"lips {lve(made, utterance.motion):.3f} {unit}, other phones {shares['other_phones']:.0%}, "
+            f"lips {lips[-1]:.3f} {unit}, energy {energies[-1]:.2f}, other phones {shares['other_phones']:.0%}, "
             f"other visemes {shares['other_visemes']:.0%}"
         )
+    print(f"mean over {len(lips)} utterances: lips {sum(lips) / len(lips):.3f} {unit}, energy {sum(energies) / len(lips):.3f}")
 
     # save
     model.save(options.output)

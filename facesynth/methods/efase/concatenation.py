@@ -42,12 +42,14 @@ def concatenate(
     fps: float,
     smoothing: Smoothing,
     mixtures: Sequence[Mixture | None] | None = None,
+    expected: Floats | None = None,
 ) -> Floats:
     """Frames [T, D] of one search result.
 
     path [P] a node for each phone (ignored where it is `pau`), bounds [P + 1] first frames of the
     phones, rest [P, D] the rest pose at each phone. Where there are mixtures [P], each phone is the mean
-    of its time-warped nodes, and a joint is smoothed as far as it is probably none that was captured.
+    of its time-warped nodes, and a joint is smoothed as far as it is probably none that was captured. Where
+    a pose is expected of each frame [T, D], silence follows it instead of resting.
     """
     frames = np.zeros((bounds[-1], nodes.frames.shape[1]))
     spoken = np.array([phone != "pau" for phone in phones])
@@ -59,7 +61,10 @@ def concatenate(
         )
     frames = _smooth_joints(frames, nodes, path, phones, bounds, fps, smoothing, mixtures)
     for first, stop in _runs(~spoken):
-        _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
+        if expected is None:
+            _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
+        else:
+            _follow(frames, int(bounds[first]), int(bounds[stop]), expected, fps)
     return frames
 
 
@@ -130,6 +135,21 @@ def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: floa
     else:
         share = _ease(k / (count + 1))
         frames[start:stop] = (1 - share) * before + share * after
+
+
+def _follow(frames: Floats, start: int, stop: int, expected: Floats, fps: float) -> None:
+    """Silence as expected; how far speech was from that at either side fades as fast as the face settles and wakes."""
+    count = stop - start
+    if count <= 0:
+        return
+    k = np.arange(1, count + 1)[:, None]
+    frames[start:stop] = expected[start:stop]
+    if start > 0:
+        leave = _ease(k / min(round(SETTLE_S * fps), count + 1))
+        frames[start:stop] += (1 - leave) * (frames[start - 1] - expected[start - 1])
+    if stop < len(frames):
+        arrive = _ease((count + 1 - k) / min(round(WAKE_S * fps), count + 1))
+        frames[start:stop] += (1 - arrive) * (frames[stop] - expected[stop])
 
 
 def _ease(u: Floats) -> Floats:

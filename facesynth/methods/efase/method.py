@@ -12,6 +12,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError, unknown
+from facesynth.methods.efase.audio import AudioTerms, Expected
 from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
 from facesynth.methods.efase.costs import Query, Weights, target_costs
@@ -23,6 +24,7 @@ from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import Plan, plan_speech
 from facesynth.methods.efase.search import Path, SearchIndex, build_index, search
+from facesynth.methods.efase.sharpening import sharpen
 from facesynth.methods.efase.soft import Mixture, soft_search
 from facesynth.methods.efase.trees import Forest
 from facesynth.methods.method import Method
@@ -52,7 +54,8 @@ class Efase(Method):
 
     `temperature` 0 is the paper: the cheapest path. Above 0 (in median rule-2 transitions, like `penalty`) every
     path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
-    (see `soft`): nearer to the truth on average, with less motion.
+    (see `soft`): nearer to the truth on average, with less motion. `audio_weight` and `pose_weight` let the sound
+    speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`); 0 in the paper.
     """
 
     pca: Pca
@@ -83,12 +86,16 @@ class Efase(Method):
         smoothing_stiffness: float = 1.0,
         temperature: float = 0.0,
         candidates: int = 150,
+        audio_weight: float = 0.0,
+        pose_weight: float = 0.0,
+        sharpening: float = 0.0,
     ) -> None:
         super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
         if temperature < 0 or candidates < 1:
             raise FacesynthError(f"temperature must be at least 0 and candidates at least 1; got {temperature:g}, {candidates}")
         self.smoothing = Smoothing(smoothing_firm, smoothing_loose, smoothing_s, smoothing_stiffness)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
+        self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0)
         self._index: SearchIndex | None = None
         self._transitions: Tensor | None = None
         self._gaps: dict[int, float] = {}
@@ -104,6 +111,7 @@ class Efase(Method):
         self.register_buffer("node_table", torch.from_numpy(np.stack([getattr(nodes, f) for f in NODE_FIELDS])))
         self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
         self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
+        self.audio.learn(corpus, self.pca, database.names, nodes.phones, seed)
         self._keep_index()
         return self
 
@@ -139,15 +147,36 @@ class Efase(Method):
 
     def plan(self, speech: Speech, *, emotion: str | None = None, constraints: Mapping[int, str] | None = None) -> Plan:
         """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
-        query = self._query(speech, emotion, constraints or {})
+        query, expected = self.asked(speech, emotion, constraints)
         soften = self._soften if self.config["temperature"] > 0 else None
-        return plan_speech(query, self._search, soften, bridge_pauses=self.config["bridge_pauses"])
+        plan = plan_speech(query, self._search, soften, bridge_pauses=self.config["bridge_pauses"])
+        return replace(plan, expected=expected.poses)
+
+    def asked(
+        self, speech: Speech, emotion: str | None = None, constraints: Mapping[int, str] | None = None
+    ) -> tuple[Query, Expected]:
+        """What the search is asked for, audio costs included, and what the sound leads one to expect."""
+        query = self._query(speech, emotion, constraints or {})
+        if self.audio.empty:
+            return query, Expected(None, None)
+        labels, bounds = self._phones(speech)
+        expected = self.audio.hear(speech, query.emotions, len(self.emotions), self.config["database_fps"], int(bounds[-1]))
+        spoken = np.array([label != SILENCE for label in labels])
+        return replace(query, heard=self.audio.costs(self.nodes(), expected, bounds, spoken, self.audio_weights())), expected
+
+    def audio_weights(self) -> tuple[float, float]:
+        """Of the sound (in this database's median transition) and of the expected pose."""
+        return self.config["audio_weight"] * (self.facts.get("median_transition") or 1.0), self.config["pose_weight"]
 
     def _soften(self, query: Query, path: Path) -> list[Mixture]:
         nodes, weights = self.nodes(), self.weights()
         targets = np.stack([target_costs(nodes, query, t, weights) for t in range(len(query))])
-        temperature = self.config["temperature"] * (self.facts.get("median_transition") or 1.0)
-        return soft_search(nodes, query, targets, weights, path.nodes, temperature, self.config["candidates"])
+        return soft_search(nodes, query, targets, weights, path.nodes, self.temperature, self.config["candidates"])
+
+    @property
+    def temperature(self) -> float:
+        """In the units of this database."""
+        return float(self.config["temperature"] * (self.facts.get("median_transition") or 1.0))
 
     def _search(self, query: Query) -> Path:
         if self.node_frames.device.type == "cpu":
@@ -205,6 +234,7 @@ class Efase(Method):
     def with_weights(self, **weights: float) -> Self:
         """The same database under other parameters of the cost, sharing its arrays."""
         other = type(self).from_config({**self.config, **weights})
+        other.audio.share(self.audio)
         other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
         other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
         for name in ("node_frames", "node_table", "rest"):
@@ -274,7 +304,11 @@ class Efase(Method):
         labels, bounds = self._phones(speech)
         rest = self.rest_of(speech, emotion)
         fps = self.config["database_fps"]
-        coordinates = concatenate(self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing, plan.mixtures)
+        coordinates = concatenate(
+            self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing, plan.mixtures, plan.expected
+        )
+        if self.config["sharpening"] > 0:
+            coordinates = sharpen(coordinates, self.config["sharpening"], fps)
         return decode(self.pca, coordinates)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth.methods.efase.costs import Query
-from facesynth.methods.efase.nodes import Ints
+from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.search import Path
 from facesynth.methods.efase.soft import Mixture
 
@@ -29,6 +29,8 @@ class Plan:
     cost: float
     mixtures: tuple[Mixture | None, ...] | None = None
     """P mixtures of nodes, none in silence between searches; None where only the cheapest path counts."""
+    expected: Floats | None = None
+    """[T, D] pose that the sound leads one to expect of each frame; None where nothing predicts it."""
 
 
 def plan_speech(

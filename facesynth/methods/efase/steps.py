@@ -53,9 +53,9 @@ class CostWeights:
 def step_terms(nodes: MotionNodes, before: Ints, after: Ints) -> StepTerms:
     """Terms of the steps from the nodes `before` [n] to the nodes `after` [m], float64."""
     previous = nodes.before[after]
-    orphan = previous < 0
-    captured = np.equal(before[:, None], previous[None])
-    free = ~captured & ~orphan[None]
+    orphan: NDArray[np.bool_] = previous < 0
+    captured = before[:, None] == previous
+    free = ~(captured | orphan)
     switches = free & (nodes.visemes[before][:, None] != nodes.visemes[previous][None])
     place, speed = _joint_terms(nodes, before, after)
     terms = (_bends(nodes, before, previous) * free, place * free, speed * free, switches, orphan, captured)
@@ -66,7 +66,7 @@ def stretched(nodes: MotionNodes, which: Ints, count: int) -> Floats:
     """[n, count, D] the motions of the nodes `which`, each time-warped to `count` frames."""
     lengths = nodes.lengths[which]
     share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)
-    at = np.where((count == lengths)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
+    at = np.where(np.equal(lengths, count)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
     low = np.minimum(at.astype(np.int64), np.maximum(lengths - 2, 0)[:, None])
     high = np.minimum(low + 1, (lengths - 1)[:, None])
     part = (at - low)[..., None]

@@ -140,7 +140,9 @@ def mean_error(model: Efase, examples: Iterable[Example]) -> float:
         speech = example.utterance.speech
         plan, bounds = model.plan(speech), speech.phones.frame_bounds(fps)
         rest = model.rest_of(speech)
-        made = concatenate(nodes, plan.nodes, speech.phones.labels, bounds, rest, fps, model.smoothing, plan.mixtures)
+        made = concatenate(
+            nodes, plan.nodes, speech.phones.labels, bounds, rest, fps, model.smoothing, plan.mixtures, plan.expected
+        )
         count = min(len(made), len(example.truth))
         errors.append(np.nanmean(((made[:count] - example.truth[:count]) ** 2).sum(axis=1)) / points)
     return float(np.mean(errors))
