@@ -51,6 +51,19 @@ def test_a_recorded_shape_over_its_own_picture_is_that_picture(speaker):
     assert report.real_time_factor > 0
 
 
+def test_a_moved_mouth_stays_sharp(speaker):
+    from scipy.ndimage import laplace
+
+    shapes = speaker.shapes[:8] + np.array([0.4, 0.5])
+    drawn = np.stack(list(TexturedFace(speaker).draw(shapes, np.arange(8), Report())))
+    inner = (slice(None), slice(45, 62), slice(50, 70))
+    sharpness = [
+        np.mean([laplace(picture.astype(float).mean(axis=2)).std() for picture in some[inner]])
+        for some in (drawn, speaker.backgrounds[:8])
+    ]
+    assert sharpness[0] > 0.85 * sharpness[1]
+
+
 def test_nothing_changes_outside_the_ring(speaker):
     face = TexturedFace(speaker)
     shapes = speaker.shapes[[3, 5]]

@@ -106,7 +106,7 @@ class TexturedFace:
         values = torch.cat([there - wanted, self._opacity.expand(len(wanted), -1)[:, :, None]], dim=2)
         drawn = warp.interpolate(wanted, values)
         opacity = drawn[..., 2].clamp(0, 1)
-        warped = sample(pictures, drawn[..., :2])
+        warped = sample(pictures, drawn[..., :2], "bicubic")
         blended = _over(box, matched(warped, box, opacity), _smooth(opacity))
         out = behind.copy()
         out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()

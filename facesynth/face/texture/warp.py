@@ -6,10 +6,14 @@ reaches from -0.5 to W - 0.5. Sampling is bilinear; outside the picture its near
 
 from __future__ import annotations
 
+from typing import Literal
+
 import torch
 from torch import Tensor, nn
 
 from facesynth.face.texture.filling import EDGE, filled
+
+Mode = Literal["bilinear", "bicubic"]
 
 
 class PiecewiseAffineWarp(nn.Module):
@@ -74,8 +78,11 @@ class PiecewiseAffineWarp(nn.Module):
         return face, row, first, length
 
 
-def sample(pictures: Tensor, displacement: Tensor) -> Tensor:
-    """Pictures [N, channels, H, W] read bilinearly at each pixel plus its displacement [N, h, w, 2] px: [N, channels, h, w]."""
+def sample(pictures: Tensor, displacement: Tensor, mode: Mode = "bilinear") -> Tensor:
+    """Pictures [N, channels, H, W] read at each pixel plus its displacement [N, h, w, 2] px: [N, channels, h, w].
+
+    Bicubic reading keeps more of what is sharp, and may overshoot the range of the picture.
+    """
     height, width = pictures.shape[-2:]
     rows, columns = displacement.shape[1:3]
     scale = torch.tensor([2 / max(width - 1, 1), 2 / max(height - 1, 1)], device=pictures.device)
@@ -83,7 +90,7 @@ def sample(pictures: Tensor, displacement: Tensor) -> Tensor:
         torch.arange(rows, device=pictures.device), torch.arange(columns, device=pictures.device), indexing="ij"
     )
     grid = (torch.stack([x, y], dim=-1) + displacement) * scale - 1
-    return nn.functional.grid_sample(pictures, grid, mode="bilinear", padding_mode="border", align_corners=True)
+    return nn.functional.grid_sample(pictures, grid, mode=mode, padding_mode="border", align_corners=True)
 
 
 def _plane(corners: Tensor, values: Tensor) -> tuple[Tensor, Tensor]:
