@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--folds", default=5, show_default=True, help="Splits by sentence.")
 @click.option("--given-folds", type=click.Path(path_type=Path), help="JSON of folds in place of drawn ones.")
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes of each fold.")
-@click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all, evenly chosen.")
+@click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all.")
 @click.option(
     "--from-predictions", "stored", type=click.Path(path_type=Path), help="Judge METHOD/ID.npz of this folder; train nothing."
 )

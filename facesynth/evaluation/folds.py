@@ -33,7 +33,7 @@ def make_folds(
 ) -> tuple[Fold, ...]:
     """`count` folds by sentence: every sentence is tested on once, in all its emotions and takes.
 
-    test_limit: at most so many tested utterances in all, evenly chosen from each fold; train_minutes: learn from so
+    test_limit: at most so many tested utterances in all, drawn from each fold alike; train_minutes: learn from so
     many minutes of each fold's recordings (see `some_minutes`). Both make a large corpus quick to judge.
     """
     folds = [Fold(train.ids, test.ids) for train, test in corpus.folds(count, seed)]
@@ -41,7 +41,7 @@ def make_folds(
     return tuple(
         Fold(
             fold.train if train_minutes is None else some_minutes(corpus, fold.train, train_minutes, seed),
-            fold.test if limit is None else _even(fold.test, limit),
+            fold.test if limit is None else some_of(fold.test, limit, seed),
         )
         for fold in folds
     )
@@ -59,6 +59,13 @@ def some_minutes(corpus: Corpus, ids: Sequence[str], minutes: float, seed: int) 
         chosen.append(str(utterance_id))
         left_s -= corpus.duration_s(utterance_id)
     return tuple(sorted(chosen))
+
+
+def some_of(ids: Sequence[str], count: int, seed: int) -> tuple[str, ...]:
+    """At most `count` utterances, drawn: every n-th of a sorted list could be one emotion throughout."""
+    if len(ids) <= count:
+        return tuple(ids)
+    return tuple(sorted(map(str, np.random.default_rng(seed).permutation(np.array(sorted(ids), object))[:count])))
 
 
 def minutes_of(corpus: Corpus, ids: Iterable[str]) -> float:
@@ -123,7 +130,3 @@ def rest_of(corpus: Corpus, tested: Iterable[str]) -> Fold:
 def _fold(corpus: Corpus, plain: dict[str, Any]) -> Fold:
     test = tuple(map(str, plain["test"]))
     return Fold(tuple(map(str, plain["train"])), test) if "train" in plain else rest_of(corpus, test)
-
-
-def _even(ids: Sequence[str], limit: int) -> tuple[str, ...]:
-    return tuple(ids) if len(ids) <= limit else tuple(ids[i * len(ids) // limit] for i in range(limit))

@@ -11,6 +11,7 @@ import numpy as np
 from facesynth.corpus import Corpus, Utterance
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import Confusion, EmotionRecogniser
+from facesynth.evaluation.folds import some_of
 from facesynth.evaluation.lips import closure_threshold
 from facesynth.evaluation.metrics import METRICS, Case
 from facesynth.evaluation.pair import UnavailableError
@@ -58,11 +59,10 @@ class Judge:
 
 
 def recogniser_of(train: Corpus) -> EmotionRecogniser | None:
-    """A recogniser that learned from at most `MOST_LEARNED` utterances, evenly chosen; None for a single emotion."""
+    """A recogniser that learned from at most `MOST_LEARNED` utterances; None for a single emotion."""
     if len({record.emotion for record in train.usable_records}) < 2:
         return None
-    step = max(1, -(-len(train) // MOST_LEARNED))
-    return EmotionRecogniser.fit(train.subset(train.ids[::step]))
+    return EmotionRecogniser.fit(train.subset(some_of(train.ids, MOST_LEARNED, 0)))
 
 
 def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion | None:

@@ -104,6 +104,8 @@ def _help(chooser: Chooser, left: Piece, right: Piece) -> tuple[Frames, Frames] 
     Among several in the best available emotion: the least audio cost, then the nearest end points.
     """
     graph = chooser.graph
+    if not chooser.help_pairs:
+        return None
     nodes = np.flatnonzero((graph.phones == graph.phones[left.node]) & (graph.after >= 0))
     nodes = nodes[graph.phones[graph.after[nodes]] == graph.phones[right.node]]
     if not len(nodes):

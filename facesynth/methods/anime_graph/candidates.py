@@ -37,8 +37,8 @@ class Candidates:
 class Chooser:
     """Candidates by phone and emotion, remembered."""
 
-    def __init__(self, graph: Graph, maps: EmotionMaps) -> None:
-        self.graph, self.maps = graph, maps
+    def __init__(self, graph: Graph, maps: EmotionMaps, *, help_pairs: bool = True) -> None:
+        self.graph, self.maps, self.help_pairs = graph, maps, help_pairs
         self._known: dict[tuple[int, int], Candidates] = {}
 
     def candidates(self, phone: int, emotion: int) -> Candidates:

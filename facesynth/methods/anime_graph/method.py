@@ -70,6 +70,8 @@ class AnimeGraph(Method):
         kernel, number of K-means centres.
     emotional_components : list of int, optional
         Which components the maps change, in place of the automatic split.
+    help_pairs : bool
+        Whether a recorded pair of the two phones helps to bridge a jump; without, every jump is a cross-fade.
     """
 
     cutoffs_hz: torch.Tensor
@@ -86,6 +88,7 @@ class AnimeGraph(Method):
         map_kernel: Kernel = "exponential",
         map_centres: int = 250,
         emotional_components: Sequence[int] | None = None,
+        help_pairs: bool = True,
     ) -> None:
         super().__init__(
             variance=variance,
@@ -97,6 +100,7 @@ class AnimeGraph(Method):
             map_kernel=map_kernel,
             map_centres=map_centres,
             emotional_components=emotional_components,
+            help_pairs=help_pairs,
         )
         self.weights = Weights(jump_weight, jump_cost_weight, audio_weight)
         self.audio = AudioFeatures(parameters)
@@ -201,7 +205,9 @@ class AnimeGraph(Method):
         """The graph with its maps, ready for searching."""
         if self._chooser is None:
             self.fitted_layout  # noqa: B018 - raises before `fit`
-            self._chooser = Chooser(Graph.from_tensors(dict(self.nodes.named_buffers())), self.maps)
+            self._chooser = Chooser(
+                Graph.from_tensors(dict(self.nodes.named_buffers())), self.maps, help_pairs=self.config["help_pairs"]
+            )
         return self._chooser
 
     @property
@@ -298,9 +304,11 @@ class AnimeGraph(Method):
         plan = self.plan(speech)
         return speech.phones.frame_bounds(self.fps)[1:-1][plan.jumps]
 
-    def explain(self, speech: Speech) -> list[dict[str, Any]]:
+    def explain(self, speech: Speech, *, look_ahead: int | None = None) -> list[dict[str, Any]]:
         """Per phone: the chosen node, its cost terms, the runners-up by audio, and what it lacks."""
-        return explain(self.chooser, self.plan(speech), self.weights, self.facts["utterances"], self.emotions)
+        return explain(
+            self.chooser, self.plan(speech, look_ahead=look_ahead), self.weights, self.facts["utterances"], self.emotions
+        )
 
     def wishes(self, speech: Speech) -> list[Wish]:
         """What each phone of the speech asks for."""

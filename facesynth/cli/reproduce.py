@@ -1,0 +1,45 @@
+"""`facesynth reproduce`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+
+@click.command("reproduce")
+@click.argument("paper")
+@click.argument("corpus", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="A .md, .csv or .json file to write as well.")
+@click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes.")
+@click.option("--test-limit", type=click.IntRange(min=2), default=24, show_default=True, help="Utterances tested.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def reproduce(
+    *,
+    paper: str,
+    corpus: Path,
+    output: Path | None,
+    train_minutes: float | None,
+    test_limit: int,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Run what can be run of PAPER (cao2005, deng2008, deng2006, saisan2004) on CORPUS.
+
+    Printed are the paper's figure, ours, and whether the two can be compared; what is missing is listed as missing.
+    """
+    from facesynth.atomic import write_text
+    from facesynth.corpus import Corpus
+    from facesynth.errors import unknown
+    from facesynth.evaluation.papers import reproduce as run
+
+    if output and output.suffix not in (".md", ".csv", ".json"):
+        raise unknown("output type", output.suffix or str(output), (".md", ".csv", ".json"))
+    result = run(paper, Corpus.open(corpus), train_minutes=train_minutes, test_limit=test_limit, seed=seed)
+    plain = json.dumps(asdict(result), indent=1, ensure_ascii=False) + "\n"
+    if output:
+        write_text(output, {".md": result.markdown(), ".csv": result.csv(), ".json": plain}[output.suffix])
+    click.echo(plain if as_json else result.markdown())

@@ -1,0 +1,66 @@
+"""Deng 2006, the dissertation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.papers import Material
+from facesynth.evaluation.papers.deng2008 import PUBLISHED, database, times, trajectories
+from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented
+from facesynth.evaluation.regions import lip_points
+from facesynth.methods.efase.method import Efase
+from facesynth.methods.registry import list_methods
+from facesynth.motion.pca import Pca
+
+PHONES = (14, 24, 33, 63)
+SECONDS = (137.67, 192.86, 371.50, 518.34)
+CHAPTERS = (
+    ("coarticulation", "fig. 5.8", "fitting error by degree of co-articulation curves", "best at 3"),
+    ("coarticulation", "§5.2.2", "expression eigenspace in 3 dimensions", "86.5 %"),
+    ("head", "table 4.1", "head motion by HMM (K16 S3 M2 LR): Euler distance, CCA", "9.1°, 0.87"),
+    ("head", "§4.1", "31 audio features in 4 dimensions", "98.89 %"),
+    ("eyes", "fig. 3.6", "eye movements covered by patches of 20 frames", "55.68 %"),
+    ("eyes", "fig. 3.8", "user ratings, ANOVA", "p = 2.4e-10"),
+)
+"""Method, place, what, figure: of the dissertation's other chapters."""
+
+
+def findings(material: Material) -> list[Finding]:
+    """Tables and figures of the dissertation."""
+    model = Efase.from_config(PUBLISHED).fit(material.train, seed=material.seed)
+    spoken = [(u, model.synthesize(u.speech, seed=material.seed)) for u in material.test]
+    return [
+        *database(model, material, "§5.3"),
+        mouth(material),
+        times(model, material, "table 5.2", PHONES, SECONDS, "2.66 GHz, 2006"),
+        *trajectories(spoken, "figs 5.30, 5.31"),
+        *missing(),
+    ]
+
+
+def mouth(material: Material) -> Finding:
+    """PCA of the mouth markers in neutral recordings."""
+    neutral = material.train.subset(r.id for r in material.train.usable_records if r.emotion == "neutral")
+    what = "variance of the mouth's markers in 5 dimensions"
+    try:
+        lips = lip_points(material.corpus.layout)
+    except UnavailableError as reason:
+        return not_available("§5.2", what, "97.5 %", str(reason))
+    if not len(neutral):
+        return not_available("§5.2", what, "97.5 %", "there are no neutral recordings")
+    dimension = material.corpus.layout.dimension
+    columns = (lips[:, None] * dimension + np.arange(dimension)).ravel()
+    frames = neutral.arrays().frames[:, columns]
+    share = float(Pca.fit(frames[np.isfinite(frames).all(axis=1)][::4], 5).variance_ratio.sum())
+    return Finding("§5.2", f"{what} (paper: 10 markers; ours: {len(lips)})", "97.5 %", f"{share:.1%}", False, material.unlike)
+
+
+def missing() -> list[Finding]:
+    """Chapters whose methods this version lacks."""
+    known = set(list_methods())
+    return [
+        not_implemented(where, what, paper, f"this version has no method {method!r} to evaluate")
+        for method, where, what, paper in CHAPTERS
+        if method not in known
+    ]

@@ -1,0 +1,70 @@
+import csv
+import io
+
+import pytest
+from corpora import tiny_corpus
+
+from facesynth.errors import FacesynthError
+from facesynth.evaluation.papers import reproduce
+from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("tiny") / "corpus", utterances=21, fps=30)
+
+
+def by_what(result, start):
+    return [one for one in result.findings if one.what.startswith(start)]
+
+
+def test_deng_2008_prints_the_paper_s_figure_ours_and_that_they_cannot_be_compared(corpus):
+    result = reproduce("deng2008", corpus, test_limit=3)
+    times = by_what(result, "synthesis of 14 / 24 / 53 / 63 phones")[0]
+    assert times.paper == "221 / 333 / 816 / 943"
+    assert len(times.ours.split(" / ")) == 4
+    assert not times.comparable
+    assert "hardware" in times.why
+    assert [one.status for one in by_what(result, "phoneme Isomap")] == ["not implemented"]
+    assert by_what(result, "variance in 25")[0].paper == "98.53 %"
+    assert "Not implemented here" in result.markdown()
+
+
+def test_saisan_2004_compares_with_the_mean_pose(corpus):
+    result = reproduce("saisan2004", corpus, test_limit=3)
+    errors = {one.what.split(", ", 1)[1]: float(one.ours) for one in by_what(result, "RMS error")}
+    assert len(errors) == 5
+    assert all(error > 0 for error in errors.values())
+    assert [one.what for one in result.findings if one.comparable] == ["largest modulus of an eigenvalue (below 1: stable)"]
+
+
+def test_cao_2005_says_what_a_corpus_without_emotions_cannot_give(corpus):
+    neutral = corpus.subset(r.id for r in corpus.records if r.emotion == "neutral")
+    result = reproduce("cao2005", neutral, test_limit=2)
+    assert by_what(result, "emotions recognised")[0].status == "not available"
+    assert by_what(result, "emotion map")[0].status == "not available"
+    assert "single emotion" in result.markdown()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paper", ["cao2005", "deng2006"])
+def test_the_others_run(corpus, paper):
+    result = reproduce(paper, corpus, test_limit=3)
+    assert any(one.status == "measured" for one in result.findings)
+
+
+def test_an_unknown_paper_is_answered_with_the_nearest(corpus):
+    with pytest.raises(FacesynthError, match="deng2008"):
+        reproduce("deng2009", corpus)
+
+
+def test_every_status_has_its_place_and_files_hold_all():
+    rows = (
+        Finding("table 1", "seconds", "2", "1", False, "other hardware"),
+        not_implemented("fig. 2", "maps", "a picture", "missing"),
+    )
+    result = Reproduction("p", "P 2000", "Ours: nothing.", rows)
+    assert "| table 1 | seconds | 2 | 1 | no: other hardware |" in result.markdown()
+    assert "- fig. 2, maps (paper: a picture): missing" in result.markdown()
+    lines = list(csv.DictReader(io.StringIO(result.csv())))
+    assert [line["status"] for line in lines] == ["measured", "not implemented"]
