@@ -19,6 +19,7 @@ VERBS = {
     "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
     "export": ("facesynth.cli.export:export", "Write a model as ONNX graphs that run without torch."),
     "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),
+    "reproduce": ("facesynth.cli.reproduce:reproduce", "A paper's figures beside ours, as far as they can be compared."),
 }
 
 
