@@ -109,7 +109,7 @@ def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[
         "fps": subject.fps,
         "sample_rate": content.sample_rate,
         "emotions": list(subject.emotions),
-        "phones": {phone: viseme_of(phone) for phone in PHONES},
+        "phones": [[phone, viseme_of(phone)] for phone in PHONES],
         "settings": dict(content.settings),
         "latency": dict(content.latency),
         "training_data": dict(subject.training_data),

@@ -44,6 +44,15 @@ def lds_file(small_corpus, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def efase_file(small_corpus, tmp_path_factory):
+    from facesynth.methods.efase.method import Efase
+
+    path = tmp_path_factory.mktemp("models") / "efase.safetensors"
+    Efase(components=12, database_fps=120).fit(small_corpus).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
 def emotion_file(small_corpus, tmp_path_factory):
     from facesynth.methods.emotion.clips import clips_of_corpus
     from facesynth.methods.emotion.detector import EmotionDetector

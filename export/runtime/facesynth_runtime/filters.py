@@ -1,0 +1,132 @@
+"""Filters and splines over time: what scipy would give, in numpy. Signals are [T, C], time first."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def gaussian(signal: Floats, sigma: float) -> Floats:
+    """A signal [T] smoothed with a Gaussian of `sigma` frames, cut at four of them; the ends are held."""
+    reach = int(4 * sigma + 0.5)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return np.convolve(np.pad(signal, reach, mode="edge"), weights / weights.sum(), mode="valid")
+
+
+def butterworth(order: int, cutoff: ArrayLike) -> Floats:
+    """[order // 2, 3, …] (gain, a1, a2) of the sections of a low-pass of even order; cut-off in 0..1 of half the rate.
+
+    Section: g (1 + z⁻¹)² / (1 + a1 z⁻¹ + a2 z⁻²), of gain 1 at rest. `cutoff` may be an array, one for each channel.
+    """
+    warped = np.tan(np.pi * np.asarray(cutoff, np.float64) / 2)
+    sections = []
+    for k in range(order // 2):
+        pole = np.exp(1j * np.pi * (2 * k + order + 1) / (2 * order)) * warped
+        z = (1 + pole) / (1 - pole)
+        a1, a2 = -2 * z.real, np.abs(z) ** 2
+        sections.append(np.stack([(1 + a1 + a2) / 4, a1, a2]))
+    return np.stack(sections)
+
+
+# A signal is continued oddly at both ends, the filter starts in the steady state of its first value, runs forth and then
+# back. Channels may be continued by different lengths: before its own continuation a channel is held constant, on which a
+# filter in its steady state stays there, so that all channels run together.
+def forth_and_back(sections: Floats, signal: Floats, reach: ArrayLike) -> Floats:
+    """Zero-phase filtering of [T, C]; `reach` frames, one number or [C], are added at each end and taken off again."""
+    count, channels = signal.shape
+    own = np.broadcast_to(np.asarray(reach, np.int64), (channels,))
+    most = int(own.max())
+    before = np.clip(np.arange(most, 0, -1)[:, None], 1, np.maximum(own, 1))
+    head = np.where(own > 0, 2 * signal[0] - np.take_along_axis(signal, np.minimum(before, count - 1), axis=0), signal[0])
+    behind = count - 1 - np.clip(np.arange(1, most + 1)[:, None], 1, np.maximum(own, 1))
+    tail = np.where(own > 0, 2 * signal[-1] - np.take_along_axis(signal, np.maximum(behind, 0), axis=0), signal[-1])
+    extended = np.concatenate([head[:most], signal, tail[:most]])
+    there = _run(sections, extended)
+    last = most + count + own - 1
+    end = there[last, np.arange(channels)]
+    held = np.where(np.arange(len(there))[:, None] > last, end, there)
+    return _run(sections, held[::-1])[::-1][most : most + count]
+
+
+def _run(sections: Floats, signal: Floats) -> Floats:
+    """The cascade over [T, C], started in the steady state of the first frame."""
+    shape = (len(sections), signal.shape[1])
+    g, a1, a2 = (np.broadcast_to(sections[:, k].reshape(len(sections), -1), shape) for k in range(3))
+    first = np.broadcast_to(signal[0], shape)
+    s0, s1 = (1 - g) * first, (g - a2) * first
+    out, rows = np.empty_like(signal), list(zip(g, a1, a2, strict=True))
+    s0, s1 = list(s0), list(s1)
+    for t, x in enumerate(signal):
+        value = x
+        for k, (gain, b1, b2) in enumerate(rows):
+            scaled = gain * value
+            y = scaled + s0[k]
+            s0[k] = 2 * scaled - b1 * y + s1[k]
+            s1[k] = scaled - b2 * y
+            value = y
+        out[t] = value
+    return out
+
+
+def spline_at(signal: Floats, at: Floats) -> Floats:
+    """The cubic spline (not-a-knot) through frames [T, C], read at places [n] in 0..T-1."""
+    count = len(signal)
+    if count < 2:
+        return np.repeat(signal, len(at), axis=0)
+    bends = _bends(signal)
+    low = np.clip(np.floor(at).astype(np.int64), 0, count - 2)
+    b = (at - low)[:, None]
+    a = 1 - b
+    curved = ((a**3 - a) * bends[low] + (b**3 - b) * bends[low + 1]) / 6
+    return a * signal[low] + b * signal[low + 1] + curved
+
+
+def _bends(signal: Floats) -> Floats:
+    """Second derivatives [T, C] of the spline: M(i-1) + 4 M(i) + M(i+1) = 6 (y(i-1) - 2 y(i) + y(i+1)).
+
+    With evenly spaced knots, not-a-knot makes the first and the last of these equations 6 M = right side.
+    """
+    count = len(signal)
+    bends = np.zeros_like(signal)
+    if count < 3:
+        return bends
+    right = 6 * np.diff(signal, n=2, axis=0)  # [T - 2]
+    bends[1], bends[-2] = right[0] / 6, right[-1] / 6
+    inner = right[1:-1].copy()  # equations of M(2) … M(T - 3)
+    if len(inner):
+        inner[0] -= bends[1]
+        inner[-1] -= bends[-2]
+        ratios = np.empty(len(inner))
+        for k in range(len(inner)):
+            ratios[k] = 1 / (4 - (ratios[k - 1] if k else 0.0))
+            inner[k] = (inner[k] - (inner[k - 1] if k else 0.0)) * ratios[k]
+        for k in range(len(inner) - 2, -1, -1):
+            inner[k] -= ratios[k] * inner[k + 1]
+        bends[2:-2] = inner
+    bends[0] = 2 * bends[1] - bends[2] if count > 3 else bends[1]
+    bends[-1] = 2 * bends[-2] - bends[-3] if count > 3 else bends[1]
+    return bends
+
+
+def smoothed(piece: Floats, weights: Floats, stiffness: float) -> Floats:
+    """Frames [n, C], n >= 5, of `min sum w_k (g_k - f_k)² + stiffness ∫ g''²`, the natural cubic smoothing spline (Reinsch)."""
+    count = len(piece)
+    Q = np.zeros((count, count - 2))
+    k = np.arange(count - 2)
+    Q[k, k], Q[k + 1, k], Q[k + 2, k] = 1.0, -2.0, 1.0
+    R = np.diag(np.full(count - 2, 2 / 3)) + np.diag(np.full(count - 3, 1 / 6), 1) + np.diag(np.full(count - 3, 1 / 6), -1)
+    spread = Q / weights[:, None]
+    return piece - stiffness * spread @ np.linalg.solve(R + stiffness * Q.T @ spread, Q.T @ piece)
+
+
+def time_warp(frames: Floats, count: int) -> Floats:
+    """Frames [L, C] stretched linearly to [count, C], first and last kept; one frame of many is the middle."""
+    length = len(frames)
+    if count == length:
+        return frames.copy()
+    at = np.array([(length - 1) / 2]) if count == 1 else np.linspace(0, length - 1, count)
+    low = np.minimum(at.astype(np.int64), max(length - 2, 0))
+    share = (at - low)[:, None]
+    return frames[low] * (1 - share) + frames[np.minimum(low + 1, length - 1)] * share

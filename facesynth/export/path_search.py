@@ -1,0 +1,75 @@
+"""The cheapest path over given candidates as one graph: a scan forth that keeps where each came from, a scan back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.export.builder import Builder
+from facesynth.export.graph import Arrays, Graph, Port
+
+CANDIDATES = 7
+"""In comparisons; any number may come."""
+
+
+def path_search_graph() -> Graph:
+    """Target costs [B, T, K] and step costs [B, T - 1, K next, K previous] to a path [B, T] and its cost [B].
+
+    Candidates that a phone lacks get a target cost of 1e30.
+    """
+    b = Builder("path_search")
+    inputs = (
+        Port("targets", "float64", ("batch", "phones", "candidates"), "cost"),
+        Port("steps", "float64", ("batch", "steps", "candidates", "candidates"), "cost; rows are next, columns previous"),
+    )
+    targets, steps = (b.input(port.name, port.dtype, port.shape) for port in inputs)
+    by_time = b.op("Transpose", targets, perm=[1, 0, 2])
+    first = b.op("Squeeze", b.span(by_time, 0, 0, 1), b.ints(0))
+    later, between = b.span(by_time, 0, 1, 2**62), b.op("Transpose", steps, perm=[1, 0, 2, 3])
+    reached, origins = b.ops("Scan", 2, first, later, between, body=_forth().graph(), num_scan_inputs=2)
+    cost = b.op("ReduceMin", reached, b.ints(1), keepdims=0)
+    last = b.op("ArgMin", reached, axis=1, keepdims=0)
+    back = {"body": _back().graph(), "num_scan_inputs": 1, "scan_input_directions": [1], "scan_output_directions": [1]}
+    _, earlier = b.ops("Scan", 2, last, origins, **back)
+    path = b.op("Transpose", b.op("Concat", earlier, b.op("Unsqueeze", last, b.ints(0)), axis=0), perm=[1, 0])
+    outputs = (Port("path", "int64", ("batch", "phones"), "candidate"), Port("cost", "float64", ("batch",), "cost"))
+    for value, port in zip((path, cost), outputs, strict=True):
+        b.output(value, port.name, port.dtype, port.shape)
+    about = "min-plus search over a candidate set; ties go to the first"
+    return Graph("path_search", about, b.model(), inputs, outputs, _example, _reference)
+
+
+def _forth() -> Builder:
+    body = Builder("forth")
+    phi = body.input("phi", "float64", ("batch", "candidates"))
+    target = body.input("target", "float64", ("batch", "candidates"))
+    step = body.input("step", "float64", ("batch", "candidates", "candidates"))
+    total = body.op("Add", step, body.op("Unsqueeze", phi, body.ints(1)))
+    best = body.op("Add", body.op("ReduceMin", total, body.ints(2), keepdims=0), target)
+    body.output(best, "phi_next", "float64", ("batch", "candidates"))
+    body.output(body.op("ArgMin", total, axis=2, keepdims=0), "origin", "int64", ("batch", "candidates"))
+    return body
+
+
+def _back() -> Builder:
+    body = Builder("back")
+    at = body.input("at", "int64", ("batch",))
+    origin = body.input("origin_of", "int64", ("batch", "candidates"))
+    chosen = body.op("Squeeze", body.op("GatherElements", origin, body.op("Unsqueeze", at, body.ints(1)), axis=1), body.ints(1))
+    body.output(chosen, "at_next", "int64", ("batch",))
+    body.output(chosen, "here", "int64", ("batch",))
+    return body
+
+
+def _example(batch: int, length: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+    shape = (batch, length, CANDIDATES)
+    return {"targets": rng.random(shape), "steps": rng.random((batch, length - 1, CANDIDATES, CANDIDATES))}
+
+
+def _reference(arrays: Arrays) -> list[NDArray[Any]]:
+    from facesynth.motion.paths import cheapest_path
+
+    found = [cheapest_path(t, s) for t, s in zip(arrays["targets"], arrays["steps"], strict=True)]
+    return [np.stack([path for path, _ in found]), np.array([cost for _, cost in found])]

@@ -1,0 +1,183 @@
+import numpy as np
+import pytest
+from facesynth_runtime import RuntimeInputError, load
+from facesynth_runtime.efase.nodes import Nodes, Query, Weights
+from facesynth_runtime.efase.search import Search
+from facesynth_runtime.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline, make_smoothing_spline
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import butter, sosfiltfilt
+
+from facesynth.errors import FacesynthError
+from facesynth.export.graph import difference
+from facesynth.export.models import export_model
+from facesynth.methods.efase.costs import Query as TorchQuery
+from facesynth.methods.efase.costs import Weights as TorchWeights
+from facesynth.methods.efase.costs import path_cost
+from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.nodes import MotionNodes
+from facesynth.methods.efase.search import build_index, search
+from facesynth.speech.speech import EmotionTrack, Speech
+
+
+@pytest.fixture(scope="module")
+def pair(efase_file, exported):
+    return Efase.load(efase_file), load(exported(efase_file))
+
+
+def weakened(speech, intensity):
+    track = speech.emotions
+    return Speech(
+        speech.audio, speech.sample_rate, speech.phones, EmotionTrack(track.labels, track.ends_s, track.intensities * intensity)
+    )
+
+
+def streamed(runtime, speech, **options):
+    stream = runtime.stream(**options)
+    feelings, amounts = speech.emotions.per_phone(speech.phones)
+    pieces = [
+        stream.push(*phone) for phone in zip(speech.phones.labels, speech.phones.ends_s, feelings, amounts.tolist(), strict=True)
+    ]
+    return np.concatenate([*pieces, stream.finish()]), sum(map(len, pieces))
+
+
+@pytest.mark.parametrize("fps", [None, 25.0, 100.0])
+@pytest.mark.parametrize("intensity", [1.0, 0.4])
+def test_the_runtime_moves_as_torch_does(pair, speeches, fps, intensity):
+    model, runtime = pair
+    for speech in speeches:
+        asked = weakened(speech, intensity)
+        wanted, got = model.synthesize(asked, fps=fps), runtime.synthesize(asked, fps=fps)
+        assert got.fps == wanted.fps
+        assert difference(got.frames, wanted.frames) < 1e-5
+
+
+def test_the_path_is_that_of_torch_or_a_tie(pair, speeches):
+    model, runtime = pair
+    for speech in speeches:
+        wanted, got = model.plan(speech), runtime.plan(speech)
+        assert got.cost == pytest.approx(wanted.cost, rel=1e-5, abs=1e-9)
+        assert np.array_equal(got.nodes, wanted.nodes)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), pnt=st.sampled_from([0.0, 0.5, 5.0, 500.0]), strict=st.booleans())
+def test_the_search_is_exact_on_random_databases(seed, pnt, strict):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(6, 60))
+    lengths = rng.integers(1, 9, count)
+    stops = np.cumsum(lengths)
+    phones = rng.integers(0, 5, count)
+    before = np.where(rng.random(count) < 0.7, np.arange(count) - 1, -1)
+    pieces = [rng.standard_normal((n, 3)) for n in lengths]
+    nodes = MotionNodes.from_pieces(pieces, phones, phones // 2, rng.integers(0, 2, count), before)
+    weights = TorchWeights(pnt)
+    index = build_index(nodes, weights)
+    nearest = np.empty(count)
+    nearest[index.forest.order] = index.tables.nearest
+    own = Weights(pnt, weights.alpha, weights.beta, weights.eta, weights.gamma, weights.delta, weights.phi)
+    table = Nodes(nodes.frames, stops - lengths, stops, phones, phones // 2, nodes.emotions, nodes.before, nearest, own)
+    wanted = rng.integers(0, 5, 8)
+    strictly = np.full(8, strict) & np.isin(wanted // 2, phones // 2)
+    fixed = {3: int(rng.integers(count))} if not strict else {}
+    query = TorchQuery(wanted, wanted // 2, rng.integers(-1, 2, 8), fixed, strictly)
+    best = search(index, query)
+    quest = Search(table)
+    for t in range(8):
+        quest.push(Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t])))
+    path = quest.path()
+    assert quest.cost(path) == pytest.approx(path_cost(nodes, query, path, weights), rel=1e-9, abs=1e-9)
+    assert quest.cost(path) == pytest.approx(best.cost, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("look_ahead", [None, 1, 3])
+@pytest.mark.parametrize("fps", [None, 25.0])
+def test_phone_by_phone_gives_what_the_whole_gives(pair, speeches, look_ahead, fps):
+    _, runtime = pair
+    for intensity in (1.0, 0.5):
+        speech = weakened(speeches[0], intensity)
+        got, before_the_end = streamed(runtime, speech, look_ahead=look_ahead, weakened=intensity < 1, fps=fps)
+        wanted = runtime.synthesize(speech, look_ahead=look_ahead, fps=fps).frames
+        assert difference(got, wanted) < 1e-5
+        assert look_ahead is None or before_the_end > 0
+
+
+def test_frames_come_as_soon_as_stated(pair, speeches):
+    """With a look-ahead of n: n phones, the node after its own, and 0.4 s."""
+    _, runtime = pair
+    ends, given, stream = speeches[0].phones.ends_s, 0, runtime.stream(look_ahead=2)
+    for t, (label, end_s) in enumerate(zip(speeches[0].phones.labels, ends, strict=True)):
+        given += len(stream.push(label, float(end_s), "neutral"))
+        if t >= 4:
+            assert given / runtime.fps >= ends[t - 4] - 0.4 - 1 / runtime.fps
+
+
+def test_a_look_ahead_costs_no_less_than_the_whole(pair, speeches):
+    _, runtime = pair
+    for speech in speeches:
+        assert runtime.plan(speech, look_ahead=1).cost >= runtime.plan(speech).cost * (1 - 1e-9)
+
+
+def test_constraints_are_kept(pair, speeches):
+    model, runtime = pair
+    name = model.facts["names"][5]
+    wanted, got = (m.plan(speeches[0], constraints={3: name}) for m in (model, runtime))
+    assert got.nodes[3] == 5
+    assert np.array_equal(got.nodes, wanted.nodes)
+    for constraints, message in (({3: "nobody:1"}, "unknown node"), ({0: name}, "is silence"), ({99: name}, "no phone 99")):
+        with pytest.raises(RuntimeInputError, match=message):
+            runtime.plan(speeches[0], constraints=constraints)
+
+
+def test_what_is_wrong_is_named(pair, speeches):
+    _, runtime = pair
+    with pytest.raises(RuntimeInputError, match="fps is -5"):
+        runtime.synthesize(speeches[0], fps=-5)
+    with pytest.raises(RuntimeInputError, match="look_ahead is 0"):
+        runtime.synthesize(speeches[0], look_ahead=0)
+    stream = runtime.stream()
+    with pytest.raises(RuntimeInputError, match="unknown phone 'xx'"):
+        stream.push("xx", 0.1, "happy")
+    with pytest.raises(RuntimeInputError, match="unknown emotion 'bored'"):
+        stream.push("aa", 0.1, "bored")
+    stream.push("aa", 0.1, "happy")
+    with pytest.raises(RuntimeInputError, match="wanted an end after 0.1 s"):
+        stream.push("aa", 0.1, "happy")
+    with pytest.raises(RuntimeInputError, match="weakened=True"):
+        stream.push("aa", 0.2, "happy", 0.5)
+
+
+def test_a_model_with_another_search_is_not_exported(small_corpus, tmp_path):
+    Efase(components=4, temperature=0.3).fit(small_corpus).save(tmp_path / "soft.safetensors")
+    with pytest.raises(FacesynthError, match="temperature"):
+        export_model(tmp_path / "soft.safetensors", tmp_path / "folder")
+
+
+def test_fewer_bits_are_smaller_and_move_nearly_the_same(efase_file, exported, pair, speeches):
+    exact = pair[1].synthesize(speeches[0]).frames
+    smaller = load(exported(efase_file, "float16"))
+    assert np.abs(smaller.synthesize(speeches[0]).frames - exact).mean() < 0.1
+    sizes = [(exported(efase_file, weights) / "arrays.npz").stat().st_size for weights in ("float32", "float16", "int8")]
+    assert sizes[0] > 1.5 * sizes[1] > 1.5 * 1.2 * sizes[2]
+
+
+@settings(max_examples=25, deadline=None)
+@given(count=st.integers(1, 90), seed=st.integers(0, 999))
+def test_filters_and_splines_are_scipys(count, seed):
+    rng = np.random.default_rng(seed)
+    signal = rng.standard_normal((count, 3))
+    assert np.allclose(gaussian(signal[:, 0], 2.5), gaussian_filter1d(signal[:, 0], 2.5, mode="nearest"))
+    if count < 2:
+        return
+    at = np.sort(rng.uniform(0, count - 1, 20))
+    assert np.allclose(spline_at(signal, at), make_interp_spline(np.arange(count), signal, k=min(3, count - 1))(at))
+    if count >= 5:
+        weights = rng.uniform(0.5, 2, count)
+        wanted = make_smoothing_spline(np.arange(count, dtype=float), signal, w=weights, lam=0.7)(np.arange(count))
+        assert np.allclose(smoothed(signal, weights, 0.7), wanted, atol=1e-7)
+    cutoffs, reach = np.array([0.1, 0.3, 0.75]), np.minimum([20, 7, 3], count - 1)
+    sections = np.moveaxis([butterworth(6, c) for c in cutoffs], 0, -1)
+    wanted = [sosfiltfilt(butter(6, c, output="sos"), s, padlen=r) for c, s, r in zip(cutoffs, signal.T, reach, strict=True)]
+    assert np.allclose(forth_and_back(sections, signal, reach), np.transpose(wanted), atol=1e-6)
