@@ -23,7 +23,7 @@ def drawn(texture, motion):
     frames = []
     for t in range(motion.length):
         back = np.stack([x, y], axis=-1)
-        for _ in range(8):  # the point that comes to lie here: a fixed point, since the motion is gentle
+        for _ in range(5):  # the point that comes to lie here: a fixed point, since the motion is gentle
             back = np.stack([x, y], axis=-1) - motion(t, back[..., 0], back[..., 1])
         offset = torch.from_numpy(back - np.stack([x, y], axis=-1)).float()[None]
         frames.append(sample(torch.from_numpy(texture)[None, None], offset)[0, 0].numpy())
