@@ -43,7 +43,9 @@ def open_video(path: Path) -> Iterator[Pictures]:
         with av.open(str(path)) as container:
             stream = _stream(container, path)
             yield Pictures(_rate(stream, path), _decoded(container, stream, path))
-    except (av.FFmpegError, UnicodeDecodeError) as error:
+    except FacesynthError:
+        raise
+    except (av.FFmpegError, ValueError) as error:
         reason = getattr(error, "strerror", "") or error
         raise FacesynthError(f"{path} cannot be read as video ({reason}); is it damaged?") from None
 

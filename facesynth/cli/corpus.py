@@ -232,14 +232,33 @@ def check(folder: Path, as_json: bool) -> None:
 
 @corpus_group.command("stats")
 @click.argument("folder", type=FOLDER)
+@click.option("--sentences", type=FILE, help="Sentences to choose from, one a line; those of the built-in performer otherwise.")
+@click.option("--add", "count", type=click.IntRange(min=0), default=5, show_default=True, help="How many sentences to name.")
+@click.option("--pictures", type=FOLDER, help="Draw each recording into this folder: waveform, phones, opening of the mouth.")
 @as_json
-def stats(folder: Path, as_json: bool) -> None:
-    """Count what a corpus holds: minutes, emotions, takes, phones, diphones, gaps."""
+def stats(folder: Path, sentences: Path | None, count: int, pictures: Path | None, as_json: bool) -> None:
+    """Count what a corpus holds: minutes, emotions, takes, phones, diphones, gaps; name sentences that would add most."""
     from facesynth.corpus import Corpus
-    from facesynth.corpus.stats import stats as count
+    from facesynth.corpus.coverage import read_sentences, sentences_to_add
+    from facesynth.corpus.stats import stats as count_all
+    from facesynth.performer.script import load_script
 
-    counted = count(Corpus.open(folder))
-    _show(as_json, counted.to_dict(), [counted.text()])
+    corpus = Corpus.open(folder)
+    counted = count_all(corpus)
+    candidates = read_sentences(sentences) if sentences else tuple(line.text for line in load_script("full"))
+    wanted = sentences_to_add(corpus, candidates, count) if count else ()
+    drawn: tuple[Path, ...] = ()
+    if pictures is not None:
+        from facesynth.corpus.pictures import draw_all
+
+        drawn = draw_all(corpus, pictures)
+    lines = [counted.text(), *(f"would add most    {found.text} ({found.new} new diphones)" for found in wanted)]
+    facts = {
+        **counted.to_dict(),
+        "would_add_most": [asdict(found) for found in wanted],
+        "pictures": [str(path) for path in drawn],
+    }
+    _show(as_json, facts, [*lines, *([f"{len(drawn)} pictures are in {pictures}"] if drawn else [])])
 
 
 def _from_video(

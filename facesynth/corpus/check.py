@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facesynth.corpus import check_whole
+from facesynth.corpus import check_needs, check_sync, check_whole
 from facesynth.corpus.check_motion import motion_problems
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import Files
@@ -45,6 +45,10 @@ def check(corpus: Corpus | str | Path) -> list[Problem]:
         problems += found
         phones |= {record.id: count} if count else {}
     problems += check_whole.duplicates(files, records.values())
+    if not header.synthetic:  # computed voices repeat themselves
+        problems += check_whole.nearly_duplicates(files, records.values())
+    problems += check_sync.sync_problems(files, header, records.values())
+    problems += check_needs.lacking(files, records.values())
     problems += check_whole.sentences(records.values())
     problems += check_whole.strays(files, records)
     problems += check_whole.rights(header, records.values())

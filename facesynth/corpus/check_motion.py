@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.check_swaps import swap_problems
 from facesynth.corpus.journal import node_name
 from facesynth.corpus.problem import Problem
 from facesynth.motion.gaps import missing_in, runs
@@ -40,6 +41,7 @@ def motion_problems(file: str, utterance_id: str, motion: Motion, phones: PhoneT
     yield from _frozen(file, motion, points, missing, names)
     if motion.layout.kind == "markers":
         yield from _unit(file, points)
+        yield from swap_problems(file, utterance_id, motion, phones)
         yield from _jumps(file, utterance_id, motion, points, phones)
 
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header
@@ -14,10 +19,16 @@ from facesynth.corpus.record import Record, plain_words
 from facesynth.corpus.signals import hash_file
 from facesynth.corpus.splits import by_sentence
 from facesynth.errors import FacesynthError
+from facesynth.speech.audio import load_audio
 from facesynth.speech.phones import PHONES
 
 FOLDERS = {"audio": ".wav", "phones": ".TextGrid", "motion": ".npz", "emotions": ".csv"}
 TABLE = "utterances.csv"
+PRINTS_PER_S = 100
+SMOOTHED = 3
+MOST_SHIFTED_S = 0.3
+SAME_SOUND = 0.9
+"""Correlation above which one is a copy. GRID talker: other sentences reach 0.74, copies cut and made softer 0.91 to 0.99."""
 
 
 def duplicates(files: Files, records: Iterable[Record]) -> Iterator[Problem]:
@@ -31,6 +42,45 @@ def duplicates(files: Files, records: Iterable[Record]) -> Iterator[Problem]:
         for ids in same.values():
             if len(ids) > 1:
                 yield Problem(TABLE, f"{', '.join(ids)} have the same {what}", "keep one, mark the others unusable")
+
+
+def nearly_duplicates(files: Files, records: Iterable[Record]) -> Iterator[Problem]:
+    """The same sound in two utterances, though not to the byte: converted, made louder or softer, or cut a little differently."""
+    prints, ids, hashes = list[NDArray[np.float32]](), list[str](), list[str]()
+    for record in records:
+        if record.usable:
+            with suppress(FacesynthError, OSError):
+                prints.append(_fingerprint(files.audio(record.id)))
+                hashes.append(hash_file(files.audio(record.id)))
+                ids.append(record.id)
+    if len(prints) < 2:
+        return
+    for first, second in zip(*np.nonzero(np.triu(_likeness(prints) > SAME_SOUND, 1)), strict=True):
+        if hashes[first] != hashes[second]:
+            what = f"{ids[first]} and {ids[second]} have nearly the same sound; is one a copy?"
+            yield Problem(TABLE, what, "listen to both; keep one, mark the other unusable", grave=False)
+
+
+def _fingerprint(path: Path) -> NDArray[np.float32]:
+    """[T] how a sound's loudness rises and falls, 100 values a second, of length 1: no two takes share that."""
+    audio, rate = load_audio(path)
+    step = rate // PRINTS_PER_S
+    power = np.square(audio[: len(audio) // step * step], dtype=np.float64).reshape(-1, step).mean(axis=1)
+    level = np.log(uniform_filter1d(power, SMOOTHED) + 3e-3 * power.max(initial=1e-12))
+    slope = np.gradient(level) if len(level) > 1 else level
+    return (slope / max(float(np.linalg.norm(slope)), 1e-12)).astype(np.float32)
+
+
+def _likeness(prints: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    """[N, N] the highest correlation of each with each, over shifts of up to `MOST_SHIFTED_S`."""
+    padded = np.zeros((len(prints), max(map(len, prints))), np.float32)
+    for row, values in zip(padded, prints, strict=True):
+        row[: len(values)] = values
+    best = padded @ padded.T
+    for shift in range(1, min(int(MOST_SHIFTED_S * PRINTS_PER_S), padded.shape[1] - 1) + 1):
+        alike = padded[:, shift:] @ padded[:, :-shift].T
+        best = np.maximum(best, np.maximum(alike, alike.T))
+    return np.asarray(best)
 
 
 def sentences(records: Iterable[Record]) -> Iterator[Problem]:

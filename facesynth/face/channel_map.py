@@ -85,8 +85,6 @@ class ChannelMap:
 
         Channels that are muted or follow nothing say nothing; of weights that no channel shows the least is taken: 0.
         """
-        from facesynth.face.blendshapes import solve
-
         gain, offset, _, _, live = self._columns
         used = (live > 0) & (np.abs(gain) > 0) & np.array([bool(channel.shares) for channel in self.channels])
         wanted = np.asarray(values, np.float64)[:, used] - offset[used]

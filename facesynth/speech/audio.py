@@ -21,6 +21,9 @@ SHORTEST_S = 0.05
 SILENT_DB = -60.0
 """Level of the loudest 50 ms, in dB of full scale, below which a sound counts as silence."""
 
+LOWEST_HZ = 1000
+"""A rate below it is no rate of speech."""
+
 
 def load_audio(path: str | Path) -> tuple[NDArray[np.float32], int]:
     """Read the sound of an audio or video file: mono samples [S] (mean of the channels, -1..1) and their rate in Hz.
@@ -100,10 +103,15 @@ def _read_container(path: Path) -> tuple[NDArray[np.float32], int]:
         with av.open(str(path)) as container:
             if not container.streams.audio:
                 raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
-            rate = int(container.streams.audio[0].rate)
+            rate = int(getattr(container.streams.audio[0], "rate", 0) or 0)
+            if rate < LOWEST_HZ:
+                raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
             blocks = list(_decoded(container, rate))
-    except av.FFmpegError as error:
-        raise FacesynthError(f"{path} cannot be read as sound or video ({error.strerror}); is it damaged?") from None
+    except FacesynthError:
+        raise
+    except (av.FFmpegError, ValueError) as error:  # damaged titles are no Unicode, damaged streams no layout that is known
+        reason = getattr(error, "strerror", "") or error
+        raise FacesynthError(f"{path} cannot be read as sound or video ({reason}); is it damaged?") from None
     return (np.concatenate(blocks) if blocks else np.zeros((0, 1), np.float32)), rate
 
 

@@ -6,7 +6,7 @@ import pytest
 from corpora import tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.check import check
+from facesynth.corpus.check import check as check_all
 from facesynth.corpus.record import write_records
 from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
@@ -23,6 +23,11 @@ def shared(tmp_path_factory):
 @pytest.fixture
 def corpus(shared, tmp_path):
     return Corpus.open(shutil.copytree(shared.path, tmp_path / "tiny"))
+
+
+def check(corpus):
+    """What is wrong, without what a dozen utterances are too few for."""
+    return [problem for problem in check_all(corpus) if "too few" not in problem.what and "little for" not in problem.what]
 
 
 def found(corpus, file: str = "") -> str:
@@ -111,7 +116,9 @@ def test_swapped_markers_are_found_with_their_node(corpus):
         return points
 
     store_motion(corpus, swap)
-    problems = check(corpus)
+    swapped = [problem for problem in check(corpus) if "swapped" in problem.what]
+    assert [problem.what.split(" (")[0] for problem in swapped] == ["cheek_r and cheek_l are swapped from 0.50 to 0.67 s"]
+    problems = [problem for problem in check(corpus) if "jumps" in problem.what]
     phones = corpus[ID].speech.phones
     nodes = [f"{ID}:{int(np.searchsorted(phones.ends_s, frame / 120, side='right'))}" for frame in (60, 80)]
     assert len(problems) == 2
@@ -191,3 +198,57 @@ def test_what_is_unusable_may_be_wrong(corpus):
     corpus.files.motion(ID).unlink()
     corpus.update(replace(corpus.record(ID), usable=False, reason="lost"))
     assert check(corpus) == []
+
+
+def test_markers_that_are_swapped_throughout_are_grave(corpus):
+    store_motion(corpus, lambda points: points[:, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 11, 13]])
+    text = found(corpus, f"motion/{ID}.npz")
+    assert "corner_r and corner_l are swapped throughout" in text
+    assert "give them each other's names" in text
+
+
+def later(audio, rate, shift_s):
+    return np.roll(audio, round(shift_s * rate))
+
+
+def shifted(corpus, ids, shift_s):
+    for utterance_id in ids:
+        speech = corpus[utterance_id].speech
+        save_wav(corpus.files.audio(utterance_id), later(speech.audio, speech.sample_rate, shift_s), speech.sample_rate)
+
+
+def test_sound_that_is_shifted_in_all_recordings_is_found(corpus):
+    shifted(corpus, corpus.ids, 0.2)
+    (problem,) = [problem for problem in check(corpus) if problem.file == "audio"]
+    assert problem.grave
+    told = int(problem.what.split(" moves ")[1].split(" ms")[0])
+    assert "before the sound" in problem.what
+    assert abs(told - 200) <= 60
+    assert "cut the beginning of every sound" in problem.do
+
+
+def test_sound_that_is_shifted_in_one_recording_is_found(tmp_path):
+    corpus = tiny_corpus(tmp_path / "c", utterances=24)
+    shifted(corpus, [corpus.ids[5]], -0.16)
+    (problem,) = [problem for problem in check(corpus) if problem.file.startswith("audio")]
+    assert problem.file == f"audio/{corpus.ids[5]}.wav"
+    assert "the mouth moves 1" in problem.what
+    assert "after the sound" in problem.what
+
+
+def test_a_copy_that_is_not_the_same_to_the_byte_is_found(corpus):
+    text = corpus.files.header.read_text(encoding="utf-8")
+    corpus.files.header.write_text(text.replace("synthetic: true", "synthetic: false"), encoding="utf-8")
+    speech = corpus[ID].speech
+    save_wav(corpus.files.audio("s00_neutral_t1"), 0.5 * speech.audio[40:], speech.sample_rate)
+    assert f"{ID} and s00_neutral_t1 have nearly the same sound" in found(corpus, "utterances.csv")
+
+
+def test_too_little_is_told_by_method_with_what_to_do(shared):
+    told = [problem for problem in check_all(shared) if problem not in check(shared)]
+    text = "\n".join(map(str, told))
+    assert not any(problem.grave for problem in told)
+    assert "minutes are little for ridge (1), lds (1), tcn (3), anime_graph (3), efase (5)" in text
+    assert "happy: too few for efase" in text
+    assert "corpus stats" in text
+    assert "too few recordings to tell an emotion by its sound" in text

@@ -1,3 +1,4 @@
+import resource
 import struct
 from contextlib import suppress
 
@@ -5,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.io
 from click.testing import CliRunner
+from clips import write_video
 
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
@@ -180,6 +182,22 @@ def hurt(content: bytes, trial: int, rng) -> bytes:
     return bytes(part)
 
 
+def articulography():
+    """MVIEW's structs: a sound with phones, and two sensors."""
+
+    def struct(name, rate, signal, phones=None):
+        found = np.zeros((1, 1), [(field, object) for field in ("NAME", "SRATE", "SIGNAL", "PHONES")])
+        found[0, 0] = (name, float(rate), signal, np.zeros((0, 0)) if phones is None else phones)
+        return found[0, 0]
+
+    phone = np.zeros((1, 2), [("LABEL", object), ("OFFS", object)])
+    phone[0, 0], phone[0, 1] = ("AA", np.array([[0.0, 0.05]])), ("B", np.array([[0.05, 0.1]]))
+    sound = struct("AUDIO", 16000, np.sin(np.arange(1600) * 0.1)[:, None], phone)
+    sensors = [struct(name, 100, np.arange(30.0).reshape(10, 3)) for name in ("UL", "LL")]
+    parts = [sound, *sensors]
+    return np.array([tuple(part) for part in parts], parts[0].dtype).reshape(1, -1)
+
+
 @pytest.fixture
 def whole_files(tmp_path):
     """One good file of each kind, small."""
@@ -191,21 +209,73 @@ def whole_files(tmp_path):
     header = "chin.x,chin.y,chin.z,lip.x,lip.y,lip.z"
     np.savetxt(tmp_path / "t.csv", points.reshape(12, 6), delimiter=",", header=header, comments="")
     (tmp_path / "l.csv").write_text(livelink_text(90), encoding="utf-8")
+    scipy.io.savemat(tmp_path / "m.mat", {"take": articulography()}, do_compression=True)
     turns = {name: np.zeros((5, 3), np.float32) for name in ("jaw", "head", "neck", "left_eye", "right_eye")}
     np.savez(tmp_path / "f.npz", fps=30, **turns)
     return sorted(tmp_path.glob("*.*"))
 
 
+OWN_LAYOUT = "lfm"
+"""Files that say themselves what their channels are."""
+
+
 def fuzz(whole_files, tmp_path, trials):
     rng = np.random.default_rng(11)
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for path in whole_files:
-        assert len(read(path, None if path.stem in "lf" else LAYOUT, fps=60).motion) > 0
+        assert len(read(path, None if path.stem in OWN_LAYOUT else LAYOUT, fps=60).motion) > 0
         target = tmp_path / f"hurt{path.suffix}"
         content = path.read_bytes()
         for trial in range(trials):
             target.write_bytes(hurt(content, trial, rng))
             with suppress(FacesynthError):
-                read(target, None if path.stem in "lf" else LAYOUT, fps=60)
+                read(target, None if path.stem in OWN_LAYOUT else LAYOUT, fps=60)
+    grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb) / 1024
+    assert grown_mb < 400, "a damaged file of some kilobytes must not take memory by what it claims"
+
+
+def fuzz_video(tmp_path, trials):
+    """What a player would have to decode: whole, cut off, and with bytes changed."""
+    from facesynth.capture.video import open_video
+    from facesynth.speech.audio import load_audio
+
+    rng = np.random.default_rng(12)
+    pictures = [np.full((48, 64, 3), 15 * number + 20, np.uint8) for number in range(12)]
+    content = write_video(tmp_path / "whole.mp4", pictures, sound_s=0.5).read_bytes()
+    target = tmp_path / "hurt.mp4"
+    for trial in range(trials):
+        target.write_bytes(hurt(content, trial, rng))
+        with suppress(FacesynthError), open_video(target) as video:
+            for _, picture in video.images:
+                assert picture.dtype == np.uint8
+        with suppress(FacesynthError):
+            load_audio(target)
+
+
+def test_damaged_videos_never_end_in_a_traceback(tmp_path):
+    fuzz_video(tmp_path, 20)
+
+
+@pytest.mark.slow
+def test_five_hundred_damaged_videos(tmp_path):
+    fuzz_video(tmp_path, 500)
+
+
+def test_of_a_folder_what_is_whole_is_converted_and_the_rest_has_its_reason(whole_files, tmp_path):
+    folder = tmp_path / "mixed"
+    folder.mkdir()
+    np.savez(folder / "good.npz", frames=np.ones((5, 6)), fps=60)
+    for path in whole_files:
+        (folder / f"empty_{path.name}").write_bytes(b"")
+        (folder / f"cut_{path.name}").write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+        other = ".c3d" if path.suffix != ".c3d" else ".npz"
+        (folder / f"called_{path.stem}{other}").write_bytes(path.read_bytes())
+    report = convert([folder], tmp_path / "out", layout=LAYOUT)
+    assert "good" in report.converted
+    others = {path.name for path in folder.iterdir()} - {"good.npz"}
+    cut_rows = {"cut_t.csv", "cut_l.csv"}  # a table that was cut off between two lines is a shorter table
+    assert others - set(report.refused) <= cut_rows
+    assert all(len(reason) > 20 and "\n" not in reason for reason in report.refused.values())
 
 
 def test_damaged_files_never_end_in_a_traceback(whole_files, tmp_path):

@@ -1,0 +1,83 @@
+"""A picture of a recording: its waveform, its words and phones, and how far the mouth is open."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.atomic import atomic_path
+from facesynth.corpus.check_sync import mouth_opening
+from facesynth.corpus.corpus import Corpus
+from facesynth.corpus.utterance import Utterance
+from facesynth.errors import FacesynthError
+from facesynth.progress import track
+from facesynth.speech.phones import SILENCE
+
+WIDTH_PER_S, MARGIN, WAVE, LABELS, MOUTH = 320, 12, 110, 46, 150
+INK, GREY, LIGHT, RED, BLUE = "#202428", "#8a9096", "#e4e7ea", "#c2452d", "#2d6fc2"
+LIPS_MEET = frozenset({"p", "b", "m"})
+
+
+def draw_all(corpus: Corpus, folder: str | Path) -> tuple[Path, ...]:
+    """Draw every usable recording of a corpus into a folder as ID.png; returns the files."""
+    written = []
+    for utterance_id in track(corpus.ids, "drawing"):
+        path = Path(folder) / f"{utterance_id}.png"
+        draw(corpus[utterance_id], path)
+        written.append(path)
+    return tuple(written)
+
+
+def draw(utterance: Utterance, path: str | Path) -> None:
+    """Draw one recording as PNG: sound above, phones in the middle (p, b and m in red), opening of the mouth below."""
+    try:
+        from PIL import Image, ImageDraw, ImageFont
+    except ImportError:
+        raise FacesynthError("pictures need the package pillow; install `facesynth[head]`") from None
+    width = round(utterance.speech.duration_s * WIDTH_PER_S) + 2 * MARGIN
+    image = Image.new("RGB", (max(width, 320), WAVE + LABELS + MOUTH + 4 * MARGIN + 16), "white")
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(13)
+    title = f"{utterance.id}   {utterance.emotion}   {utterance.speech.text}"
+    pen.text((MARGIN, 2), title, fill=INK, font=font)
+    top = 16 + MARGIN
+    bottom = image.height - MARGIN
+    ends = [0.0, *utterance.speech.phones.ends_s.tolist()]
+    for label, (start_s, end_s) in zip(utterance.speech.phones.labels, pairwise(ends), strict=True):
+        left, right = (MARGIN + time_s * WIDTH_PER_S for time_s in (start_s, end_s))
+        pen.line([(right, top), (right, bottom)], fill=LIGHT)
+        if label != SILENCE:
+            colour = RED if label in LIPS_MEET else INK
+            pen.text(((left + right) / 2, top + WAVE + LABELS / 2), label, fill=colour, font=font, anchor="mm")
+    for x, (low, high) in enumerate(_envelope(utterance, image.width - 2 * MARGIN)):
+        middle = top + WAVE / 2
+        pen.line([(MARGIN + x, middle - high * WAVE / 2), (MARGIN + x, middle - low * WAVE / 2)], fill=GREY)
+    _draw_mouth(pen, utterance, top + WAVE + LABELS, bottom, font)
+    with atomic_path(path) as part, open(part, "wb") as file:
+        image.save(file, "PNG")
+
+
+def _envelope(utterance: Utterance, columns: int) -> NDArray[np.float64]:
+    """[columns, 2] lowest and highest sample under each column, the loudest being 1."""
+    audio = utterance.speech.audio.astype(np.float64)
+    step = utterance.speech.sample_rate / WIDTH_PER_S
+    edges = np.minimum((np.arange(columns) * step).astype(int), max(len(audio) - 1, 0))
+    low, high = np.minimum.reduceat(audio, edges), np.maximum.reduceat(audio, edges)
+    return np.stack([low, high], axis=1) / max(float(np.abs(audio).max()), 1e-9)
+
+
+def _draw_mouth(pen: object, utterance: Utterance, top: float, bottom: float, font: object) -> None:
+    opening = mouth_opening(utterance.motion)
+    known = np.isfinite(opening)
+    unit = utterance.motion.layout.unit
+    if not known.any():
+        return
+    low, high = float(opening[known].min()), float(opening[known].max())
+    x = MARGIN + utterance.motion.times_s * WIDTH_PER_S
+    y = bottom - (opening - low) / max(high - low, 1e-9) * (bottom - top - MARGIN)
+    for k in range(len(opening) - 1):
+        if known[k] and known[k + 1]:
+            pen.line([(x[k], y[k]), (x[k + 1], y[k + 1])], fill=BLUE, width=2)  # type: ignore[attr-defined]
+    pen.text((MARGIN, top), f"mouth {low:.3g} to {high:.3g} {unit}", fill=BLUE, font=font)  # type: ignore[attr-defined]
