@@ -67,7 +67,7 @@ class Curve:
 
     @property
     def front(self) -> tuple[Point, ...]:
-        """By rising energy, up to 1, the points that no other point beats in both error and closeness of the energy to 1."""
+        """By rising energy, the points that no other point beats in error and in how near the energy is to 1."""
         kept = [p for p in self.points if not any(_beats(other, p) for other in self.points)]
         return tuple(sorted(kept, key=lambda point: point.energy_ratio))
 
@@ -134,5 +134,5 @@ def _lips(motion: Motion) -> Motion:
 
 def _beats(one: Point, other: Point) -> bool:
     """Whether a point is better in one respect and no worse in the other."""
-    ours, theirs = (point.lve, abs(1 - point.energy_ratio)) if (point := one) else (), (other.lve, abs(1 - other.energy_ratio))
-    return ours != theirs and all(a <= b for a, b in zip(ours, theirs, strict=True))
+    faults = [(point.lve, abs(1 - point.energy_ratio)) for point in (one, other)]
+    return faults[0] != faults[1] and all(a <= b for a, b in zip(*faults, strict=True))
