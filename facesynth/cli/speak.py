@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.own_rig import as_arkit, own_head, own_rig_options
 from facesynth.errors import FacesynthError
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ class Fps(click.ParamType):
 @click.option("--head", type=Gain(), default="1", show_default=True, help="off, or a factor on head motion.")
 @click.option("--eyes", type=Gain(), default="1", show_default=True, help="off, or a factor on gaze.")
 @click.option("--size", default="1280x720", show_default=True, help="Of the video.")
+@own_rig_options
 @click.option("--explain", type=click.Path(path_type=Path), help="Write why each phone got its node (JSON).")
 @click.option("--noise", type=click.FloatRange(min=0), help="lds: amount of random motion; 1 as recorded, 0 none.")
 @click.option(
@@ -140,10 +142,11 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
         return _show_likeness(method, heard, path, outputs, settings, options)
     rig = load_head()
     stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"])
-    performance = perform(method, heard.speech, rig, stage, settings)
+    own = own_head(options)
+    performance = perform(method, heard.speech, rig, stage, settings, as_arkit(method, own, options, None))
     targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
     for target in targets:
-        write_performance(target, performance, rig, size)
+        write_performance(target, performance, rig, size, own)
         click.echo(f"{target}: {heard.speech.duration_s:.2f} s at {float(options['fps']):.5g} fps", err=True)
     written = [str(target) for target in targets]
     if heard.source in ("transcript", "recognition"):

@@ -98,7 +98,7 @@ def correlations(heard: Floats, opening: Floats) -> Floats:
     """Correlation of two signals [T] for each of `LAGS`: positive ones where the opening comes later."""
     count = len(heard)
     found = []
-    for lag in LAGS:
+    for lag in LAGS.tolist():
         a, b = heard[max(-lag, 0) : count - max(lag, 0)], opening[max(lag, 0) : count - max(-lag, 0)]
         spread = a.std() * b.std()
         found.append(float(((a - a.mean()) * (b - b.mean())).mean() / spread) if spread > 1e-12 else 0.0)

