@@ -10,7 +10,7 @@ in a priority queue; it is run as printed, stopped after 60 s or 2 GB. "did not 
 import argparse
 import heapq
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
 from facesynth.methods.anime_graph.maps import EmotionMaps
 from facesynth.methods.anime_graph.plan import Wish, lay_steps
 from facesynth.methods.anime_graph.search import Weights, best_path, look_ahead_path, path_cost
+from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 NODES, PHONES_ASKED, FRAMES, HEARD, WIDTH = 10_000, 30, 10, 8, 20
+LONG_S = 62.0
 SECONDS_PER_PHONE = HEARD / 100
 TIME_LIMIT_S, MEMORY_LIMIT_BYTES = 60.0, 2e9
 QUEUE_ENTRY_BYTES = 250
@@ -108,12 +110,61 @@ def measure(chooser, wishes, metric, weights, speech_s, label):
     print(f"  global optimum {cost:.2f}: {seconds * 1000:.1f} ms, real-time factor {seconds / speech_s:.4f}")
     for phones in (3, 6):
         path, took = timed(lambda phones=phones: look_ahead_path(steps, weights, phones))
-        extra = path_cost(steps, path, weights) / cost - 1
+        extra = max(path_cost(steps, path, weights) / cost - 1, 0.0)
         print(f"  look-ahead of {phones} phones: {took * 1000:.1f} ms, {extra:+.2%} cost")
     text, _ = priority_queue(steps[:3], weights)
     print(f"  the paper's queue, first 3 phones: {text}; Viterbi there: {best_path(steps[:3], weights)[1]:.2f}")
     text, _ = priority_queue(steps, weights)
     print(f"  the paper's queue, all {len(steps)} phones: {text}")
+
+
+def cut(graph, count):
+    """The first `count` nodes of a graph."""
+    keep = {f.name: getattr(graph, f.name)[:count] for f in fields(graph) if f.name not in {"frames", "features"}}
+    after = np.where(keep["after"] < count, keep["after"], -1)
+    return replace(graph, **{**keep, "after": after})
+
+
+def long_speech(utterances, seconds):
+    """Utterances one after the other until they last so long."""
+    parts, length_s = [], 0.0
+    for utterance in utterances:
+        if length_s < seconds:
+            parts.append(utterance.speech)
+            length_s += utterance.speech.phones.duration_s
+    rate, starts = parts[0].sample_rate, np.cumsum([0.0, *(p.phones.duration_s for p in parts)])
+    audio = [np.resize(p.audio, round(p.phones.duration_s * rate)) for p in parts]
+    ends = np.concatenate([p.phones.ends_s + start for p, start in zip(parts, starts, strict=False)])
+    labels = tuple(label for p in parts for label in p.phones.labels)
+    felt = EmotionTrack(tuple(p.emotions.labels[0] for p in parts), starts[1:], np.ones(len(parts)))
+    return Speech(np.concatenate(audio), rate, PhoneTrack(labels, ends), felt)
+
+
+def measure_long(model, speech):
+    _, searched_s = timed(lambda: model.plan(speech), repeats=2)
+    motion, seconds = timed(lambda: model.synthesize(speech), repeats=2)
+    print(
+        f"{speech.duration_s:.1f} s of speech, {len(speech.phones)} phones, {len(model.graph)} nodes: features and search "
+        f"{searched_s:.2f} s, all of synthesis {seconds:.2f} s (real-time factor {seconds / speech.duration_s:.4f}), "
+        f"{len(motion)} frames"
+    )
+
+
+def measure_trained(path, folder, weights):
+    from facesynth.corpus import Corpus
+    from facesynth.methods.registry import load
+
+    model = load(path)
+    _, held_out = Corpus.open(folder).split(0)
+    utterance = min(held_out, key=lambda u: abs(len(u.speech.phones) - PHONES_ASKED))
+    wishes, metric = model.wishes(utterance.speech), model.components.metric.numpy()
+    asked = (wishes, metric, weights, utterance.speech.duration_s)
+    measure(model.chooser, *asked, "trained")
+    neutral = replace(model.graph, emotions=np.full(len(model.graph), wishes[0].emotion))
+    measure(Chooser(cut(neutral, NODES), EmotionMaps()), *asked, f"{NODES} of them, all emotions as one")
+    measure(Chooser(cut(neutral, 500), EmotionMaps()), *asked, "500 of them, all emotions as one")
+    measure(Chooser(neutral, EmotionMaps()), *asked, "all of them, all emotions as one")
+    measure_long(model, long_speech(held_out, LONG_S))
 
 
 def main():
@@ -123,16 +174,7 @@ def main():
     options = parser.parse_args()
     weights = Weights()
     if options.model:
-        from facesynth.corpus import Corpus
-        from facesynth.methods.registry import load
-
-        model = load(options.model)
-        _, held_out = Corpus.open(options.corpus).split(0)
-        utterance = min(held_out, key=lambda u: abs(len(u.speech.phones) - PHONES_ASKED))
-        wishes, metric = model.wishes(utterance.speech), model.components.metric.numpy()
-        measure(model.chooser, wishes, metric, weights, utterance.speech.duration_s, "trained")
-        neutral = replace(model.graph, emotions=np.full(len(model.graph), wishes[0].emotion))
-        measure(Chooser(neutral, EmotionMaps()), wishes, metric, weights, utterance.speech.duration_s, "all emotions as one")
+        measure_trained(options.model, options.corpus, weights)
         return
     metric = np.eye(WIDTH) / np.sqrt(270)
     for count, label in ((NODES, "generated"), (500, "generated, small")):

@@ -1,6 +1,6 @@
 """Build an anime graph from a corpus, speak its held-out sentences, judge its emotion maps, save the model.
 
-python train/anime_graph.py CORPUS -o anime_graph.safetensors [--maps] [--config configs/anime_graph.yaml] [variance=0.98 …]
+python train/anime_graph.py CORPUS -o anime_graph.safetensors [--maps 20] [--config configs/anime_graph.yaml] [variance=0.98 …]
 """
 
 import argparse
@@ -22,8 +22,7 @@ def main() -> None:
     parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
     parser.add_argument("-o", "--output", type=Path, default=Path("anime_graph.safetensors"))
     parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "anime_graph.yaml")
-    parser.add_argument("--maps", action="store_true", help="map left-out sentences for every pair of emotions")
-    parser.add_argument("--folds", type=int, default=10, help="groups in which sentences are left out for --maps")
+    parser.add_argument("--maps", type=int, metavar="N", help="leave each of N parallel sentences out and map it, for every pair")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_intermixed_args()
 
@@ -48,7 +47,7 @@ def main() -> None:
 
     # evaluate: emotions on sentences left out
     if options.maps:
-        report_maps(model, corpus, options.folds)
+        report_maps(model, corpus, options.maps)
 
     # save
     model.save(options.output)
@@ -60,21 +59,24 @@ def _lips(made, truth) -> str:  # type: ignore[no-untyped-def]
     return f"lips {lve(made, truth):.3f} {truth.layout.unit}, " if has_lips else ""
 
 
-def report_maps(model: AnimeGraph, corpus: Corpus, folds: int) -> None:
+def report_maps(model: AnimeGraph, corpus: Corpus, most: int) -> None:
     """Unit-cube RMS of every ordered pair, and how it falls with the number of parallel sentences."""
     takes = [take for take in (take_of(u, model.components) for u in corpus) if take is not None]
     trial = MapTrial(takes, model.split, model.components, corpus.layout, model.map_settings.centres)
+    few = trial.with_sentences(most)
+    default = f"{model.map_settings.kernel} {model.map_settings.width}"
     for source, target in permutations(corpus.emotions, 2):
         try:
-            score = trial.score(source, target, folds=folds)
+            score = few.score(source, target)
         except FacesynthError as error:
             print(error)
             continue
         widths = ", ".join(f"{name} {value:.5f}" for name, value in score.mapped.items())
-        print(f"{source} to {target}, {score.sentences} sentences: unchanged {score.unchanged:.5f}, "
-              f"mean difference {score.mean_difference:.5f}, {widths}; best: {score.best}")  # fmt: skip
+        verdict = f"{default}: {'nearer' if score.helps(default) else 'NOT nearer'} than both"
+        print(f"{source} to {target}, each of {score.sentences} sentences left out: unchanged {score.unchanged:.5f}, "
+              f"mean difference {score.mean_difference:.5f}, {widths}; best: {score.best}; {verdict}", flush=True)  # fmt: skip
         curve = trial.learning_curve(source, target, model.map_settings)
-        print("  by sentences learned from: " + ", ".join(f"{count}: {value:.5f}" for count, value in curve.items()))
+        print("  by sentences learned from: " + ", ".join(f"{count}: {value:.5f}" for count, value in curve.items()), flush=True)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ VERBS = {
     "corpus": ("facesynth.cli.corpus:corpus_group", "Make, fill and check a performer's recordings."),
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
+    "emotion": ("facesynth.cli.emotion:emotion", "Hear the emotion in a voice."),
     "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
     "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
     "export": ("facesynth.cli.export:export", "Write a model as ONNX graphs that run without torch."),

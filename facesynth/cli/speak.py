@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.feeling import account, asks_to_listen, feeling_options, mapping, spoken_feeling
 from facesynth.cli.own_rig import as_arkit, own_head, own_rig_options
+from facesynth.cli.recordings import recordings
 from facesynth.errors import FacesynthError
 
 if TYPE_CHECKING:
+    from facesynth.methods.anime_graph.method import AnimeGraph
     from facesynth.methods.efase.method import Efase
     from facesynth.methods.method import Method
     from facesynth.speech.hearing import Heard
 
-AUDIO_SUFFIXES = (
-    ".wav",
-    ".flac",
-    ".ogg",
-    ".mp3",
-    ".m4a",
-    ".aac",
-    ".aiff",
-    ".aif",
-    ".opus",
-    ".mp4",
-    ".mov",
-    ".mkv",
-    ".mpg",
-    ".avi",
-)
 BROADCAST = {"23.976": Fraction(24000, 1001), "29.97": Fraction(30000, 1001), "59.94": Fraction(60000, 1001)}
 
 
@@ -83,9 +71,14 @@ class Fps(click.ParamType):
 @click.option("--text", help="What is said.")
 @click.option("--text-file", type=click.Path(path_type=Path), help="The same, from a file.")
 @click.option("--phones", type=click.Path(path_type=Path), help="TextGrid, or lines of `end label`.")
-@click.option("--emotion", help="One emotion for everything.")
-@click.option("--emotions", type=click.Path(path_type=Path), help="Emotion over time: CSV, or lines of `end emotion`.")
+@click.option("--emotion", help="One emotion for everything; `auto`: the one heard in the voice.")
+@click.option(
+    "--emotions",
+    type=click.Path(path_type=Path),
+    help="Emotion over time: CSV, or lines of `end emotion`; `auto`: as heard in the voice.",
+)
 @click.option("--intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of --emotion; 0 is neutral.")
+@feeling_options
 @click.option(
     "--constraints",
     type=click.Path(path_type=Path),
@@ -96,6 +89,14 @@ class Fps(click.ParamType):
 @click.option("--eyes", type=Gain(), default="1", show_default=True, help="off, or a factor on gaze.")
 @click.option("--size", default="1280x720", show_default=True, help="Of the video.")
 @own_rig_options
+@click.option(
+    "--deform",
+    type=click.Choice(["shapes", "distance", "regions"]),
+    default="shapes",
+    show_default=True,
+    help="What moves the skin in videos: the solved shapes, or the markers, by distance along the skin or by regions.",
+)
+@click.option("--look-ahead", type=click.IntRange(min=1), help="anime_graph: search so many phones ahead, as for streaming.")
 @click.option("--explain", type=click.Path(path_type=Path), help="Write why each phone got its node (JSON).")
 @click.option("--noise", type=click.FloatRange(min=0), help="lds: amount of random motion; 1 as recorded, 0 none.")
 @click.option(
@@ -116,13 +117,13 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
     from facesynth.speaking import check_output
 
     outputs = [check_output(path) for path in options["outputs"]]
-    recordings = _recordings(speech)
-    if len(recordings) > 1:
+    paths = recordings(speech)
+    if len(paths) > 1:
         _require_batch(outputs, options)
     size = parse_size(options["size"])
     method = load(model)
     options["face_of"] = model
-    results = [_speak_one(method, path, outputs, size, options) for path in recordings]
+    results = [_speak_one(method, path, outputs, size, options) for path in paths]
     if as_json:
         click.echo(json.dumps(results if len(results) > 1 else results[0]))
 
@@ -141,9 +142,11 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
     if is_tracked(method.fitted_layout):
         return _show_likeness(method, heard, path, outputs, settings, options)
     rig = load_head()
-    stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"])
+    stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"], options["deform"])
     own = own_head(options)
-    performance = perform(method, heard.speech, rig, stage, settings, as_arkit(method, own, options, None))
+    change = as_arkit(method, own, options, mapping(method, heard.speech, options))
+    performance = perform(method, heard.speech, rig, stage, settings, change)
+    found = account(method, heard.speech, settings)
     targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
     for target in targets:
         write_performance(target, performance, rig, size, own)
@@ -154,9 +157,9 @@ def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int,
         write_textgrid(grid, heard.speech.phones, heard.words)
         written.append(str(grid))
     if options["explain"]:
-        write_text(options["explain"], json.dumps(_as_efase(method).explain(heard.speech, **settings), indent=1))
+        write_text(options["explain"], json.dumps(_explaining(method).explain(heard.speech, **settings), indent=1))
         written.append(str(options["explain"]))
-    return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written}
+    return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written, **found}
 
 
 def _show_likeness(
@@ -173,7 +176,8 @@ def _show_likeness(
                 f"a model of points in a picture has no head for {target.suffix}; write .mp4 (the real face) or .npz"
             )
     speaker = load_face(options["face_of"], method)
-    motion = method.synthesize(heard.speech, seed=options["seed"], **settings)
+    motion, change = method.synthesize(heard.speech, seed=options["seed"], **settings), mapping(method, heard.speech, options)
+    motion = change(motion) if change else motion
     facts: dict[str, Any] = {"speech": str(path), "duration_s": heard.speech.duration_s, "written": list(map(str, targets))}
     for target in targets:
         if target.suffix.lower() == ".npz":
@@ -197,30 +201,40 @@ def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
         phones = next((p for p in [path.with_suffix(".TextGrid")] if p.exists()), None)
     if text is None and phones is None and path.with_suffix(".txt").exists():
         text = _read_text(path.with_suffix(".txt"))
+    if asks_to_listen(options):
+        heard = hear(path, text=text, phones_path=phones)
+        return replace(heard, speech=spoken_feeling(heard.speech, method, options["face_of"], options))
     emotion = options["emotion"] or (None if options["emotions"] else method.emotions[0])
     feeling = {"emotion": emotion, "emotions_path": options["emotions"], "intensity": options["intensity"]}
     return hear(path, text=text, phones_path=phones, **feeling)
 
 
 def _method_options(method: Method, heard: Heard, options: dict[str, Any]) -> dict[str, Any]:
-    if options["constraints"] or options["explain"]:
-        _as_efase(method)
+    if options["explain"]:
+        _explaining(method)
+    if options["look_ahead"] is not None:
+        if method.name != "anime_graph":
+            raise FacesynthError(f"{method.name} always searches the whole utterance; --look-ahead is for anime_graph")
+        return {"look_ahead": options["look_ahead"]}
     if options["noise"] is not None:
         if method.name != "lds":
             raise FacesynthError(f"{method.name} draws no noise; --noise is for lds")
         return {"noise": options["noise"]}
     if not options["constraints"]:
         return {}
+    if method.name != "efase":
+        raise FacesynthError(f"{method.name} has no nodes to constrain; efase has")
     from facesynth.methods.efase.constraints import read_constraints
 
     return {"constraints": read_constraints(options["constraints"], heard.speech.phones)}
 
 
-def _as_efase(method: Method) -> Efase:
+def _explaining(method: Method) -> Efase | AnimeGraph:
+    from facesynth.methods.anime_graph.method import AnimeGraph
     from facesynth.methods.efase.method import Efase
 
-    if not isinstance(method, Efase):
-        raise FacesynthError(f"{method.name} has no nodes to constrain or explain; efase has")
+    if not isinstance(method, Efase | AnimeGraph):
+        raise FacesynthError(f"{method.name} has no nodes to explain; efase and anime_graph have")
     return method
 
 
@@ -235,21 +249,6 @@ def _read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise FacesynthError(f"{path}: cannot read the transcript ({error})") from None
-
-
-def _recordings(paths: tuple[Path, ...]) -> list[Path]:
-    found: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO_SUFFIXES)
-            if not inside:
-                raise FacesynthError(f"{path} holds no sound; wanted files such as clip{AUDIO_SUFFIXES[0]}")
-            found += inside
-        elif path.exists():
-            found.append(path)
-        else:
-            raise FacesynthError(f"{path}: no such file")
-    return found
 
 
 def _require_batch(outputs: list[Path], options: dict[str, Any]) -> None:

@@ -31,13 +31,23 @@ def train(
     seed: int,
     as_json: bool,
 ) -> None:
-    """Train METHOD on CORPUS and write one model file."""
+    """Train METHOD on CORPUS and write one model file.
+
+    METHOD `emotion` makes a detector of emotions in the voice; it also learns from a CSV of sound files
+    (file,emotion,speaker,sentence).
+    """
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
     from facesynth.likeness import save_face
     from facesynth.methods.registry import create
 
-    model = create(method, **{**(load_config(config) if config else {}), **parse_settings(settings)})
+    chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
+    if method == "emotion":
+        from facesynth.cli.emotion import train_detector
+
+        train_detector(corpus, chosen, output or Path("emotion.safetensors"), seed if split == "train" else None, as_json=as_json)
+        return
+    model = create(method, **chosen)
     recordings = Corpus.open(corpus)
     if split == "train":
         recordings, _ = recordings.split(seed)
@@ -55,7 +65,9 @@ def train(
     kind = "synthetic performer" if recordings.synthetic else "performer"
     click.echo(f"{method} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
     if moved := model.facts.get("repaired"):
-        click.echo(f"unstable: eigenvalues of modulus {', '.join(f'{m:.3f}' for m in moved)} were moved inside, the rest refitted")
+        click.echo(
+            f"unstable: eigenvalues of modulus {', '.join(f'{m:.3f}' for m in moved)} were moved inside, the rest refitted"
+        )
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

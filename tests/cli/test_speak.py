@@ -63,7 +63,7 @@ def test_help_names_every_verb_without_importing_torch():
     program += "r = CliRunner().invoke(cli, ['--help']); assert r.exit_code == 0, r; print(r.output, 'torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.strip().endswith("False")
-    for verb in ("demo", "corpus", "train", "speak", "tune", "evaluate"):
+    for verb in ("demo", "corpus", "train", "speak", "emotion", "tune", "evaluate"):
         assert verb in done.stdout
 
 

@@ -244,3 +244,26 @@ def test_nothing_that_moves_is_refused(tmp_path):
     np.savez(path, **arrays)
     with pytest.raises(FacesynthError, match="nothing moves"):
         AnimeGraph().fit(corpus)
+
+
+def test_a_minute_of_speech(model, corpus):
+    parts, starts = [], [0.0]
+    while starts[-1] < 62:
+        parts.append(corpus[corpus.ids[len(parts) % len(corpus)]].speech)
+        starts.append(starts[-1] + parts[-1].phones.duration_s)
+    ends = np.concatenate([p.phones.ends_s + start for p, start in zip(parts, starts, strict=False)])
+    phones = PhoneTrack(tuple(label for p in parts for label in p.phones.labels), ends)
+    emotions = EmotionTrack(tuple(p.emotions.labels[0] for p in parts), np.array(starts[1:]), np.ones(len(parts)))
+    audio = np.concatenate([np.resize(p.audio, round(p.phones.duration_s * p.sample_rate)) for p in parts])
+    motion = model.synthesize(Speech(audio, parts[0].sample_rate, phones, emotions))
+    assert len(motion) == round(phones.duration_s * model.fps) >= 62 * model.fps
+    assert np.isfinite(motion.frames).all()
+    assert len(np.concatenate(list(model.stream(model.wishes(Speech(audio, 16000, phones, emotions)))))) == len(motion)
+
+
+def test_jumps_can_be_bridged_without_recorded_pairs(corpus, unseen):
+    model, utterance = unseen
+    plain = AnimeGraph(help_pairs=False).fit(corpus.split()[0])
+    hows = [{join.how for join in blend(m.chooser, m.plan(utterance.speech), m.fps)[1].joins.values()} for m in (model, plain)]
+    assert "help" in hows[0]
+    assert hows[1] == {"extension"}

@@ -30,15 +30,17 @@ def corpus(tmp_path_factory):
 
 def test_configs_name_only_known_settings():
     assert AnimeGraph.from_config(load_config(ROOT / "configs" / "anime_graph.yaml")).config == AnimeGraph().config
+    paper = AnimeGraph.from_config(load_config(ROOT / "configs" / "anime_graph_paper.yaml")).config
+    assert (paper["variance"], paper["map_width"]) == (0.95, "closest")
     assert DetectorSettings.from_config(load_config(ROOT / "configs" / "emotion.yaml")) == DetectorSettings()
     assert DetectorSettings.from_config(load_config(ROOT / "configs" / "emotion_paper.yaml")).features == "paper"
 
 
 def test_training_the_anime_graph(corpus, tmp_path):
     model = tmp_path / "graph.safetensors"
-    said = run("anime_graph.py", corpus.path, "-o", model, "--maps", "--folds", "2", "map_centres=30")
+    said = run("anime_graph.py", corpus.path, "-o", model, "--maps", "5", "map_centres=30")
     assert "jumps in" in said
-    assert "neutral to happy, " in said
+    assert "neutral to happy, each of 3 sentences left out" in said
     assert "needs at least 3 sentences" in said
     assert load(model).name == "anime_graph"
 

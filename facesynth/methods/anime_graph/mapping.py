@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Literal
 
@@ -92,18 +93,49 @@ def require_pairs(split: Split, sentences: int, source: str, target: str) -> Non
 
 def fit_map(samples: Sequence[Samples], settings: MapSettings, *, seed: int = 0) -> RbfMap:
     """The displacement `e_j - e_i` as a function of e_i, through K-means centres (eq. 10)."""
-    x, shift = _stacked(samples)
-    centres, values = cluster_means(x, shift, settings.centres, seed=seed)
-    if settings.width == "closest":
-        # The kernels as printed, exp(-x/d) and exp(-x²/d), d the distance of the two closest samples.
-        d = closest_distance(x)
-        width = d if settings.kernel == "exponential" else float(np.sqrt(d))
-        return RbfMap.fit(centres, values, width=width, kernel=settings.kernel)
-    width = median_distance(centres)
-    if settings.width == "median":
-        return RbfMap.fit(centres, values, width=width, kernel=settings.kernel)
-    factor, ridge = _cross_validated(samples, settings, seed)
-    return RbfMap.fit(centres, values, width=factor * width, kernel=settings.kernel, ridge=ridge)
+    return MapLearner(samples, settings.centres, seed=seed).fit(settings.width, settings.kernel)
+
+
+class MapLearner:
+    """Matched sentences, clustered once, from which maps of any width and kernel are fitted."""
+
+    def __init__(self, samples: Sequence[Samples], centres: int, *, seed: int = 0) -> None:
+        self.samples, self.centres, self.seed = samples, centres, seed
+        self.x, shift = _stacked(samples)
+        self.at, self.values = cluster_means(self.x, shift, centres, seed=seed)
+
+    def fit(self, width: Width, kernel: Kernel) -> RbfMap:
+        """A map; `width` says how its kernels' reach is found."""
+        if width == "closest":
+            # The kernels as printed, exp(-x/d) and exp(-x²/d), d the distance of the two closest samples.
+            d = closest_distance(self.x)
+            return RbfMap.fit(self.at, self.values, width=d if kernel == "exponential" else float(np.sqrt(d)), kernel=kernel)
+        median = median_distance(self.at)
+        if width == "median":
+            return RbfMap.fit(self.at, self.values, width=median, kernel=kernel)
+        factor, ridge = self._cross_validated(kernel)
+        return RbfMap.fit(self.at, self.values, width=factor * median, kernel=kernel, ridge=ridge)
+
+    def _cross_validated(self, kernel: Kernel) -> tuple[float, float]:
+        """Width factor and ridge with the least squared error on sentences left out."""
+        error = dict.fromkeys(product(WIDTH_FACTORS, RIDGES), 0.0)
+        for learner, asked, wanted in self._folds:
+            median = median_distance(learner.at)
+            for factor, ridge in error:
+                rbf = RbfMap.fit(learner.at, learner.values, width=factor * median, kernel=kernel, ridge=ridge)
+                error[factor, ridge] += float(np.square(rbf(torch.from_numpy(asked)).numpy() - wanted).sum())
+        return min(error, key=lambda key: error[key])
+
+    @cached_property
+    def _folds(self) -> list[tuple[MapLearner, Floats, Floats]]:
+        """Learners of most sentences, with what the others ask and want of them."""
+        sentences = sorted({s.sentence for s in self.samples})
+        folds = []
+        for fold in range(min(FOLDS, len(sentences))):
+            left_out = set(sentences[fold::FOLDS])
+            learner = MapLearner([s for s in self.samples if s.sentence not in left_out], self.centres, seed=self.seed)
+            folds.append((learner, *_stacked([s for s in self.samples if s.sentence in left_out])))
+        return folds
 
 
 def lasting_shift(samples: Sequence[Samples], emotional: NDArray[np.int64]) -> Floats:
@@ -130,19 +162,3 @@ def _stacked(samples: Sequence[Samples]) -> tuple[Floats, Floats]:
     x, y = (np.concatenate([getattr(s, side) for s in samples]) for side in ("source", "target"))
     step = max(1, -(-len(x) // MOST_SAMPLES))
     return x[::step], (y - x)[::step]
-
-
-def _cross_validated(samples: Sequence[Samples], settings: MapSettings, seed: int) -> tuple[float, float]:
-    """Width factor and ridge with the least squared error on sentences left out."""
-    sentences = sorted({s.sentence for s in samples})
-    error = dict.fromkeys(product(WIDTH_FACTORS, RIDGES), 0.0)
-    for fold in range(min(FOLDS, len(sentences))):
-        left_out = set(sentences[fold::FOLDS])
-        x, shift = _stacked([s for s in samples if s.sentence not in left_out])
-        centres, values = cluster_means(x, shift, settings.centres, seed=seed)
-        width = median_distance(centres)
-        asked, wanted = _stacked([s for s in samples if s.sentence in left_out])
-        for factor, ridge in error:
-            rbf = RbfMap.fit(centres, values, width=factor * width, kernel=settings.kernel, ridge=ridge)
-            error[factor, ridge] += float(np.square(rbf(torch.from_numpy(asked)).numpy() - wanted).sum())
-    return min(error, key=lambda key: error[key])

@@ -13,6 +13,7 @@ from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.mapping import (
     WIDTHS,
+    MapLearner,
     MapSettings,
     Samples,
     dropped_shift,
@@ -49,6 +50,10 @@ class MapScore:
         """The kernel and width with the least error."""
         return min(self.mapped, key=lambda name: self.mapped[name])
 
+    def helps(self, name: str) -> bool:
+        """Whether mapping with this kernel and width comes nearer than both doing nothing and the mean difference."""
+        return self.mapped[name] < min(self.unchanged, self.mean_difference)
+
 
 @dataclass(frozen=True, eq=False)
 class MapTrial:
@@ -60,16 +65,17 @@ class MapTrial:
     layout: Layout
     centres: int = 250
 
-    def score(self, source: str, target: str, *, folds: int = 10, seed: int = 0) -> MapScore:
-        """Leave sentences out, one by one or in `folds` groups, and map them by what the others teach."""
+    def score(self, source: str, target: str, *, folds: int | None = None, seed: int = 0) -> MapScore:
+        """Leave sentences out, one by one or in so many `folds`, and map them by what the others teach."""
         pairs, samples = self._pairs(source, target)
         sentences = sorted({a.sentence for a, _ in pairs})
-        settings = [MapSettings(width, kernel, self.centres) for kernel in KERNELS for width in WIDTHS]
+        folds = min(folds or len(sentences), len(sentences))
         errors: dict[str, list[float]] = {}
-        for fold in track(range(min(folds, len(sentences))), f"{source} to {target}"):
+        for fold in track(range(folds), f"{source} to {target}"):
             left_out = set(sentences[fold::folds])
             known = [s for s in samples if s.sentence not in left_out]
-            maps = {f"{s.kernel} {s.width}": fit_map(known, s, seed=seed) for s in settings}
+            learner = MapLearner(known, self.centres, seed=seed)
+            maps = {f"{kernel} {width}": learner.fit(width, kernel) for kernel in KERNELS for width in WIDTHS}
             shifts = self._shifts(known)
             mean = self._mean_difference([p for p in pairs if p[0].sentence not in left_out])
             for pair in pairs:
@@ -81,7 +87,7 @@ class MapTrial:
         return MapScore(source, target, len(sentences), unchanged, mean_difference, means)
 
     def learning_curve(
-        self, source: str, target: str, settings: MapSettings, counts: Sequence[int] = (1, 2, 3, 5, 10, 15), *, seed: int = 0
+        self, source: str, target: str, settings: MapSettings, counts: Sequence[int] = (1, 2, 3, 5, 10, 15, 30), *, seed: int = 0
     ) -> dict[int, float]:
         """Unit-cube RMS on the last fifth of the sentences by the number of others learned from."""
         pairs, samples = self._pairs(source, target)
@@ -97,6 +103,14 @@ class MapTrial:
             errors = [self._errors(p, {"map": rbf}, shifts, np.zeros(1))["map"] for p in pairs if p[0].sentence in asked]
             curve[count] = float(np.mean(errors))
         return curve
+
+    def with_sentences(self, most: int) -> MapTrial:
+        """The same with at most so many sentences, those that were recorded in the most emotions."""
+        emotions: dict[str, set[str]] = {}
+        for take in self.takes:
+            emotions.setdefault(take.sentence, set()).add(take.emotion)
+        kept = sorted(emotions, key=lambda sentence: (-len(emotions[sentence]), sentence))[:most]
+        return replace(self, takes=[take for take in self.takes if take.sentence in kept])
 
     def _pairs(self, source: str, target: str) -> tuple[list[tuple[Take, Take]], list[Samples]]:
         pairs = emotion_pairs(self.takes, source, target)

@@ -28,6 +28,8 @@ RATE = 16000
 FORMAT = 1
 FEATURES = ("voice", "paper")
 SMALLEST_SPREAD = 1e-9
+WINDOW_S, HOP_S = 2.0, 0.5
+"""Along time: length of what is listened to at once, and its step."""
 LEAST_OF_A_SPEAKER = 4
 """Recordings from which a speaker's own mean and spread are taken."""
 
@@ -168,11 +170,27 @@ class EmotionDetector(nn.Module):
         audio: NDArray[Any],
         rate: int,
         *,
-        window_s: float = 2.0,
-        hop_s: float = 0.5,
+        window_s: float = WINDOW_S,
+        hop_s: float = HOP_S,
         speaker: NDArray[np.float64] | None = None,
     ) -> EmotionTrack:
         """Emotions along time: the most probable one of the windows that cover each moment."""
+        ends_s, probabilities = self.along(audio, rate, window_s=window_s, hop_s=hop_s, speaker=speaker)
+        return track_of(ends_s, probabilities, self.emotions)
+
+    def along(
+        self,
+        audio: NDArray[Any],
+        rate: int,
+        *,
+        window_s: float = WINDOW_S,
+        hop_s: float = HOP_S,
+        speaker: NDArray[np.float64] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Ends [H] (s) of steps of `hop_s` and the probabilities [H, K] there: the mean of the windows that cover a step.
+
+        Windows in which nobody speaks do not count; where there are no others, the nearest one does.
+        """
         duration_s = len(audio) / rate
         if not 0 < hop_s <= window_s:
             raise FacesynthError(
@@ -181,29 +199,22 @@ class EmotionDetector(nn.Module):
         count = max(1, int(np.ceil((duration_s - window_s) / hop_s)) + 1)
         starts = np.minimum(np.arange(count) * hop_s, max(0.0, duration_s - window_s))
         pieces = [audio[round(s * rate) : round((s + window_s) * rate)] for s in starts]
-        x = [self._quiet_or_features(piece, rate) for piece in pieces]
+        x = [self._quiet_or_features(piece, rate) for piece in track(pieces, "emotion", len(pieces))]
         heard = [k for k, features in enumerate(x) if features is not None]
         if not heard:
             raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
         known = np.array([x[k] for k in heard])
         probabilities = self(torch.from_numpy(self._of_speaker(known, speaker))).numpy()
-        return self._as_track(starts[heard], probabilities, window_s, hop_s, duration_s)
+        ends_s = np.append(np.arange(hop_s, duration_s - hop_s / 2, hop_s), duration_s)
+        apart_s = np.abs(starts[heard] + window_s / 2 - (ends_s - hop_s / 2)[:, None])  # [H, windows]
+        covering = (apart_s <= window_s / 2) | (apart_s == apart_s.min(axis=1, keepdims=True))
+        return ends_s, covering @ probabilities / covering.sum(axis=1, keepdims=True)
 
     def _quiet_or_features(self, piece: NDArray[Any], rate: int) -> NDArray[np.float64] | None:
         try:
             return self.features(piece, rate)
         except FacesynthError:
             return None
-
-    def _as_track(self, starts: NDArray[np.float64], probabilities: NDArray[np.float64], *times_s: float) -> EmotionTrack:
-        window_s, hop_s, duration_s = times_s
-        ends = np.append(np.arange(hop_s, duration_s - hop_s / 2, hop_s), duration_s)
-        middles = ends - hop_s / 2
-        covering = np.abs(starts + window_s / 2 - middles[:, None]) <= window_s / 2
-        covering |= np.abs(starts + window_s / 2 - middles[:, None]).argmin(axis=1)[:, None] == np.arange(len(starts))
-        best = (covering @ probabilities).argmax(axis=1)
-        last = np.append(np.flatnonzero(np.diff(best)), len(best) - 1)
-        return EmotionTrack(tuple(self.emotions[k] for k in best[last]), ends[last], np.ones(len(last)))
 
     def _of_speaker(self, x: NDArray[np.float64], speaker: NDArray[np.float64] | None) -> NDArray[np.float64]:
         if not self.emotions:
@@ -252,6 +263,13 @@ class EmotionDetector(nn.Module):
             owner, _, leaf = key.rpartition(".")
             detector.get_submodule(owner).register_buffer(leaf, value)
         return detector.eval()
+
+
+def track_of(ends_s: NDArray[np.float64], probabilities: NDArray[np.float64], emotions: Sequence[str]) -> EmotionTrack:
+    """The most probable emotion of each step, those of one emotion in a row as one interval."""
+    best = probabilities.argmax(axis=1)
+    last = np.append(np.flatnonzero(np.diff(best)), len(best) - 1)
+    return EmotionTrack(tuple(emotions[k] for k in best[last]), ends_s[last], np.ones(len(last)))
 
 
 def by_speaker(x: NDArray[np.float64], speakers: NDArray[Any]) -> NDArray[np.float64]:

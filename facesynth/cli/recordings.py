@@ -1,0 +1,28 @@
+"""Files of sound that a command is given, one by one or as folders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from facesynth.errors import FacesynthError
+
+AUDIO_SUFFIXES = (
+    ".wav", ".flac", ".ogg", ".mp3", ".m4a", ".aac", ".aiff", ".aif", ".opus", ".mp4", ".mov", ".mkv", ".mpg", ".avi",
+)  # fmt: skip
+
+
+def recordings(paths: Iterable[Path]) -> list[Path]:
+    """The files named, and those inside the folders named; FacesynthError where there is none."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO_SUFFIXES)
+            if not inside:
+                raise FacesynthError(f"{path} holds no sound; wanted files such as clip{AUDIO_SUFFIXES[0]}")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise FacesynthError(f"{path}: no such file")
+    return found

@@ -1,0 +1,81 @@
+"""The anime graph on the built-in performer: what its maps, its filters and its closures are worth on sentences left out."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from facesynth.errors import FacesynthError
+from facesynth.methods.anime_graph.closure import bilabial_spans
+from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
+from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.anime_graph.parallel import take_of
+from facesynth.methods.anime_graph.plan import blend
+from facesynth.methods.anime_graph.report import MapTrial
+from facesynth.motion.lips import lip_gap
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def corpus():
+    from facesynth.performer.build import build_performer
+
+    pytest.importorskip("facesynth.speech.alignment")
+    try:
+        return build_performer("small")
+    except FacesynthError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="module")
+def split(corpus):
+    """Sentences to learn from, and others."""
+    return corpus.split(0)
+
+
+@pytest.fixture(scope="module")
+def model(split):
+    return AnimeGraph().fit(split[0])
+
+
+def test_maps_come_nearer_than_nothing_and_than_the_mean_difference(corpus, model):
+    takes = [take for take in (take_of(u, model.components) for u in corpus) if take is not None]
+    trial = MapTrial(takes, model.split, model.components, corpus.layout)
+    for pair in permutations(corpus.emotions, 2):
+        score = trial.score(*pair, folds=5)
+        assert score.sentences >= 15
+        assert score.helps("exponential cross-validated"), score
+        assert score.mapped["exponential cross-validated"] < 1.02 * score.mapped[score.best], score
+
+
+def test_lips_still_close_in_every_other_emotion(split, model):
+    held_out = list(split[1])
+
+    def narrowest(utterance, motion):
+        gap = lip_gap(motion)
+        return [np.nanmin(gap[a:b]) for a, b in bilabial_spans(utterance.speech.phones, model.fps) if b > a]
+
+    recorded = np.concatenate([narrowest(u, u.motion) for u in held_out])
+    closed = np.nanpercentile(recorded, 90)
+    for target in model.emotions:
+        others = [u for u in held_out if u.emotion != target]
+        before = np.concatenate([narrowest(u, u.motion) for u in others]) <= closed
+        after = np.concatenate([narrowest(u, model.map_emotion(u.motion, u.emotion, target)) for u in others]) <= closed
+        assert after.mean() >= before.mean() - 0.05, target
+
+
+def test_no_component_holds_energy_above_its_cut_off(split, model):
+    cutoffs_hz = model.cutoffs_hz.numpy()
+    smooth, kept, captured = [], 0.0, 0.0
+    for utterance in split[1]:
+        blended, _ = blend(model.chooser, model.plan(utterance.speech), model.fps)
+        smooth.append(low_pass(blended, cutoffs_hz, model.fps))
+        complete = utterance.motion.frames[np.isfinite(utterance.motion.frames).all(axis=1)]
+        motion = model.components.encode_array(complete)
+        kept = kept + np.square(low_pass(motion, cutoffs_hz, model.fps) - motion.mean(axis=0)).sum(axis=0)
+        captured = captured + np.square(motion - motion.mean(axis=0)).sum(axis=0)
+    frequencies, energy = energy_spectrum(smooth, model.fps)
+    above = (energy * (frequencies[:, None] > cutoffs_hz)).sum(axis=0) / energy.sum(axis=0)
+    assert above.max() <= 0.01
+    assert (kept / captured).min() >= 0.95
