@@ -175,6 +175,7 @@ def _show_likeness(
             raise FacesynthError(
                 f"a model of points in a picture has no head for {target.suffix}; write .mp4 (the real face) or .npz"
             )
+    _warn_of_idle_options()
     speaker = load_face(options["face_of"], method)
     motion, change = method.synthesize(heard.speech, seed=options["seed"], **settings), mapping(method, heard.speech, options)
     motion = change(motion) if change else motion
@@ -191,6 +192,18 @@ def _show_likeness(
             err=True,
         )
     return facts
+
+
+def _warn_of_idle_options() -> None:
+    """A real face keeps the rate and the size of its pictures, and the head that is in them."""
+    context = click.get_current_context()
+    given = [f"--{name}" for name in ("fps", "size", "head", "eyes") if _was_given(context, name)]
+    if given:
+        click.echo(f"warning: {', '.join(given)}: a real face keeps the rate, size, head and eyes of its pictures", err=True)
+
+
+def _was_given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:

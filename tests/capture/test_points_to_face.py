@@ -206,6 +206,15 @@ def test_a_missing_face_file_is_one_clear_line(studio, tmp_path):
     assert not (tmp_path / "out.mp4").exists()
 
 
+def test_options_that_do_nothing_are_named(studio, tmp_path):
+    save_wav(tmp_path / "new.wav", sound(9).astype(np.float32), RATE)
+    (tmp_path / "new.lab").write_text(f"{FRAMES / FPS} aa\n")
+    arguments = [studio[2], tmp_path / "new.wav", "--phones", tmp_path / "new.lab", "--fps", 60, "-o", tmp_path / "out.mp4"]
+    result = CliRunner().invoke(speak, list(map(str, [*arguments, "--pictures", "nearest"])))
+    assert "warning: --fps: a real face keeps the rate" in result.stderr
+    assert float(read_video(tmp_path / "out.mp4").fps) == FPS
+
+
 def test_silence_is_one_clear_line(studio, tmp_path):
     save_wav(tmp_path / "quiet.wav", np.zeros(RATE, np.float32), RATE)
     with pytest.raises(FacesynthError, match="silent"):
