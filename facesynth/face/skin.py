@@ -13,7 +13,8 @@ from torch import nn
 from facesynth.errors import FacesynthError, unknown
 from facesynth.face.animation import BLINKS, FaceAnimation
 from facesynth.face.deform import MeshDistanceDeformer
-from facesynth.face.markers import marker_vertices
+from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of
+from facesynth.face.markers import marker_layout, marker_vertices
 from facesynth.face.regions import RegionDeformer
 from facesynth.face.rig import Rig, pose
 from facesynth.motion.layout import Layout
@@ -50,14 +51,16 @@ class MarkerSkin:
 
 
 def marker_skin(way: str, rig: Rig, motion: Motion, animation: FaceAnimation) -> MarkerSkin:
-    """The skin of a rig under a motion of the head's own markers, deformed in one of `DEFORMERS`.
+    """The skin of a rig under a motion of markers, deformed in one of `DEFORMERS`.
 
-    Blinks that the animation adds, and that the eyelid markers do not show, come on top of the deformation.
+    Points of a performer's own layout count where they are known to lie on one of the head's markers. Blinks that the
+    animation adds, and that the eyelid markers do not show, come on top of the deformation.
     """
     if way not in DEFORMERS:
         raise unknown("way to deform", way, tuple(DEFORMERS))
     if motion.layout.kind != "markers":
         raise FacesynthError(f"a mesh is deformed by 3-D markers in mm; this model makes {motion.layout.kind}")
+    motion = on_head_markers(rig, motion)
     frames = resample(motion, animation.fps).frames
     if len(frames) != len(animation):
         raise FacesynthError(f"motion and animation differ in length: {len(frames)} and {len(animation)} frames")
@@ -65,6 +68,34 @@ def marker_skin(way: str, rig: Rig, motion: Motion, animation: FaceAnimation) ->
     seen = shown_blinks(rig, motion.layout, frames)
     missing = np.maximum(animation.weights[:, _lids(rig)] - seen, 0.0)
     return MarkerSkin(rig, deformer, animation, np.ascontiguousarray(frames, np.float32), missing)
+
+
+def on_head_markers(rig: Rig, motion: Motion) -> Motion:
+    """A motion of any points as one of those of the head's markers that the points are known to lie on, mm."""
+    if is_of_the_head(motion.layout):
+        return motion
+    fit = fit_layout(rig, motion.layout, rest_of(motion))
+    own = marker_layout(rig)
+    marker_at = {vertex: number for number, vertex in enumerate(marker_vertices(rig, own).tolist())}
+    point_of = {marker_at[v]: k for k, v in enumerate(fit.vertices.tolist()) if v in marker_at}
+    if not fit.named:
+        raise FacesynthError(
+            f"too few of these points have names of known places ({', '.join(motion.layout.names[:3])} …) to move the skin "
+            "by them; let the solved shapes move it"
+        )
+    kept = sorted(point_of)
+    placed = fit.on_head(rig, motion.frames)[:, [point_of[marker] for marker in kept]]
+    return Motion(placed.reshape(len(motion), -1).astype(np.float32), motion.fps, _only(own, kept))
+
+
+def _only(layout: Layout, kept: list[int]) -> Layout:
+    """A layout of some of its points."""
+    place = {old: new for new, old in enumerate(kept)}
+    groups = {name: tuple(place[k] for k in members if k in place) for name, members in layout.groups.items()}
+    pairs = tuple((place[a], place[b]) for a, b in layout.lip_pairs if a in place and b in place)
+    neutral = np.asarray(layout.neutral).reshape(-1, 3)[kept]
+    names = tuple(layout.names[k] for k in kept)
+    return Layout(layout.kind, names, {name: g for name, g in groups.items() if g}, pairs, tuple(neutral.ravel().tolist()))
 
 
 def shown_blinks(rig: Rig, layout: Layout, frames: NDArray[Any]) -> Floats:

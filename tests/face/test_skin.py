@@ -5,9 +5,10 @@ import pytest
 
 from facesynth.errors import FacesynthError
 from facesynth.face.animation import animate
+from facesynth.face.landmark_names import LANDMARKS
 from facesynth.face.markers import marker_layout, marker_vertices
 from facesynth.face.rig import load_head
-from facesynth.face.skin import marker_skin, shown_blinks
+from facesynth.face.skin import marker_skin, on_head_markers, shown_blinks
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
@@ -65,6 +66,22 @@ def test_the_rate_of_the_pictures_may_be_another(rig):
     animation = animate(motion, rig, eyes_gain=0, head_gain=0).resampled(60)
     skin = marker_skin("regions", rig, motion, animation)
     assert len(skin.frames) == len(animation) == 24
+
+
+def test_points_of_another_layout_move_the_markers_they_lie_on(rig):
+    """Landmarks of a face half as large, in other places of a list."""
+    motion = motion_of(rig, jawOpen=0.6)
+    landmark = {marker: name for name, marker in LANDMARKS.items() if marker in motion.layout.names}
+    kept = [motion.layout.names.index(marker) for marker in landmark][::-1]
+    points = motion.points[:, kept] * 0.8
+    names = tuple(landmark[motion.layout.names[k]] for k in kept)
+    strange = Motion(points.reshape(12, -1), 30, Layout("markers", names, neutral=tuple(map(float, points[0].ravel()))))
+    found = on_head_markers(rig, strange)
+    lip = found.layout.names.index("lower_lip")
+    wanted = motion.points[:, motion.layout.names.index("lower_lip")]
+    np.testing.assert_allclose(found.points[:, lip], wanted, atol=1.0)
+    skin = marker_skin("regions", rig, strange, animate(strange, rig, eyes_gain=0, head_gain=0))
+    assert (skin.vertices(11) - rig.rest_mm)[marker_vertices(rig, found.layout)[lip], 1] < -3
 
 
 def test_what_cannot_be_deformed_is_refused(rig):
