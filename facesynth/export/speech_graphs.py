@@ -24,17 +24,63 @@ def rasta_plp_graph(plp: RastaPlp) -> Graph:
     """Sound [B, S] to RASTA-PLP cepstra [B, 1 + S // hop, order + 1]."""
     b = Builder("rasta_plp")
     audio = b.op("Cast", b.input("audio", "float32", ("batch", "samples")), to=11)
-    length, count = len(plp.window), plp.fft // 2 + 1
+    length = len(plp.window)
     frames = _framed(b, audio, length, plp.hop, length // 2)
-    power = power_spectrum(b, frames, plp.window.numpy(), np.arange(count), plp.fft, "float64")
-    floor = ROUNDING_POWER * float(plp.window.square().sum())
-    energies = b.op("Log", b.op("MatMul", b.op("Add", power, b.constant(floor, "float64")), b.constant(plp.bands.numpy())))
-    filtered = _rasta(b, energies, plp.rasta.numpy())
-    auditory = b.op("Exp", b.op("Div", b.op("Add", filtered, b.constant(np.log(plp.loudness.numpy()))), b.constant(3.0)))
-    cepstra = b.op("Cast", _cepstra(b, auditory, plp), to=1)
+    energies = _log_energies(b, frames, plp)
+    first = b.span(energies, 1, 0, 1)
+    silence = b.op("Mul", b.op("Squeeze", first, b.ints(1)), b.constant(0.0, "float64"))
+    filtered, _, _ = _rasta(b, energies, b.op("Concat", first, first, first, first, axis=1), silence, plp)
     port = Port("cepstra", "float32", ("batch", "frames", plp.order + 1), "none", plp.fps)
-    b.output(cepstra, port.name, port.dtype, port.shape)
+    b.output(_cepstra(b, filtered, plp), port.name, port.dtype, port.shape)
     return _of_sound(b, "RASTA-PLP cepstra, frame k centred on k / rate seconds", port, plp.sample_rate, plp)
+
+
+def rasta_plp_stream_graph(plp: RastaPlp) -> Graph:
+    """The same for windows of sound [B, T, L] that come in pieces, the filter's state handed on.
+
+    `fresh` is 1 for the first piece, which is taken to have begun long ago, and 0 for those after it.
+    """
+    b, length, bands = Builder("rasta_plp"), len(plp.window), plp.bands.shape[1]
+    inputs = (
+        Port("windows", "float32", ("batch", "frames", length), "full scale 1", plp.sample_rate),
+        Port("history", "float64", ("batch", 4, bands), "log energies of the frames before"),
+        Port("level", "float64", ("batch", bands), "last output of the filter"),
+        Port("fresh", "float64", (), "0 or 1"),
+    )
+    windows, history, level, fresh = (b.input(port.name, port.dtype, port.shape) for port in inputs)
+    energies = _log_energies(b, b.op("Cast", windows, to=11), plp)
+    first = b.span(energies, 1, 0, 1)
+    begun = b.op("Concat", first, first, first, first, axis=1)
+    before = b.op("Where", b.op("Greater", fresh, b.constant(0.5)), begun, history)
+    filtered, held, leaked = _rasta(b, energies, before, b.op("Mul", level, b.op("Sub", b.constant(1.0), fresh)), plp)
+    outputs = (
+        Port("cepstra", "float32", ("batch", "frames", plp.order + 1), "none", plp.fps),
+        Port("history_after", "float64", ("batch", 4, bands), "log energies"),
+        Port("level_after", "float64", ("batch", bands), "none"),
+    )
+    for value, port in zip((_cepstra(b, filtered, plp), held, leaked), outputs, strict=True):
+        b.output(value, port.name, port.dtype, port.shape)
+
+    def example(batch: int, count: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+        frames = (0.1 * rng.standard_normal((batch, count, length))).astype(np.float32)
+        state = {"history": np.zeros((batch, 4, bands)), "level": np.zeros((batch, bands)), "fresh": np.array(1.0)}
+        return {"windows": frames, **state}
+
+    def reference(arrays: Arrays) -> list[NDArray[Any]]:
+        frames = torch.from_numpy(arrays["windows"]).double()
+        power = torch.fft.rfft(frames * plp.window, plp.fft).abs() ** 2 + ROUNDING_POWER * plp.window.square().sum()
+        energies = (power @ plp.bands).log()
+        filtered = plp.filter_along_time(energies)
+        cepstra = plp.cepstra(torch.exp((filtered + plp.loudness.log()) / 3))
+        return [cepstra.float().numpy(), energies[:, -4:].numpy(), filtered[:, -1].numpy()]
+
+    return Graph(b.name, "RASTA-PLP cepstra of windows, with the filter's state", b.model(), inputs, outputs, example, reference)
+
+
+def _log_energies(b: Builder, frames: str, plp: RastaPlp) -> str:
+    power = power_spectrum(b, frames, plp.window.numpy(), np.arange(plp.fft // 2 + 1), plp.fft, "float64")
+    floor = ROUNDING_POWER * float(plp.window.square().sum())
+    return b.op("Log", b.op("MatMul", b.op("Add", power, b.constant(floor, "float64")), b.constant(plp.bands.numpy())))
 
 
 def cepstrum_graph(cepstrum: RealCepstrum, sample_rate: int) -> Graph:
@@ -129,15 +175,13 @@ def _framed(b: Builder, audio: str, length: int, hop: int, before: int) -> str:
     return b.op("Gather", padded, places, axis=1)
 
 
-def _rasta(b: Builder, energies: str, response: NDArray[np.float64]) -> str:
-    """The filter along time [B, T, bands]: the first frame has lasted for ever. A scan over taps would be long: one over time.
+def _rasta(b: Builder, energies: str, history: str, level: str, plp: RastaPlp) -> tuple[str, str, str]:
+    """The filter along time [B, T, bands], after four frames of history and an output; and both after it.
 
-    H(z) = (0.2 + 0.1 z⁻¹ - 0.1 z⁻³ - 0.2 z⁻⁴) / (1 - pole z⁻¹). Its state is the last output and four inputs; at rest on a
-    constant the output is 0, since H(1) = 0.
+    H(z) = (0.2 + 0.1 z⁻¹ - 0.1 z⁻³ - 0.2 z⁻⁴) / (1 - pole z⁻¹). At rest on a constant the output is 0, since H(1) = 0.
     """
-    pole = float(response[-1] / response[-2])
-    first = b.span(energies, 1, 0, 1)
-    held = b.op("Concat", first, first, first, first, energies, axis=1)
+    pole = float(plp.rasta[-1] / plp.rasta[-2])
+    held = b.op("Concat", history, energies, axis=1)
     taps = (0.2, 0.1, 0.0, -0.1, -0.2)
     size = b.shape_of(energies, 1)
     parts = []
@@ -151,13 +195,13 @@ def _rasta(b: Builder, energies: str, response: NDArray[np.float64]) -> str:
     leaked = body.op("Add", body.op("Mul", y, body.constant(pole, "float64")), x)
     body.output(leaked, "y_next", "float64", ("batch", "bands"))
     body.output(leaked, "y_here", "float64", ("batch", "bands"))
-    start = b.op("Mul", b.op("Squeeze", first, b.ints(1)), b.constant(0.0, "float64"))
-    _, filtered = b.ops("Scan", 2, start, driven, body=body.graph(), num_scan_inputs=1)
-    return b.op("Transpose", filtered, perm=[1, 0, 2])
+    last, filtered = b.ops("Scan", 2, level, driven, body=body.graph(), num_scan_inputs=1)
+    return b.op("Transpose", filtered, perm=[1, 0, 2]), b.span(held, 1, -4, 2**62), last
 
 
-def _cepstra(b: Builder, auditory: str, plp: RastaPlp) -> str:
-    """Auditory spectrum to lifted cepstra: autocorrelation, Levinson-Durbin and the recursion to cepstra, written out."""
+def _cepstra(b: Builder, filtered: str, plp: RastaPlp) -> str:
+    """Filtered energies to lifted cepstra: autocorrelation, Levinson-Durbin and the recursion to cepstra, written out."""
+    auditory = b.op("Exp", b.op("Div", b.op("Add", filtered, b.constant(np.log(plp.loudness.numpy()))), b.constant(3.0)))
     bands, p = plp.bands.shape[1], plp.order
     inner = b.span(auditory, 2, 1, bands - 1)
     spectrum = b.op("Concat", b.span(inner, 2, 0, 1), inner, b.span(inner, 2, bands - 3, bands - 2), axis=2)
@@ -181,4 +225,4 @@ def _cepstra(b: Builder, auditory: str, plp: RastaPlp) -> str:
         cepstra.append(b.op("Neg", b.op("Sum", *terms)))
     lifter = np.arange(p + 1.0) ** plp.lift
     lifter[0] = 1.0
-    return b.op("Mul", b.op("Concat", *cepstra, axis=2), b.constant(lifter))
+    return b.op("Cast", b.op("Mul", b.op("Concat", *cepstra, axis=2), b.constant(lifter)), to=1)

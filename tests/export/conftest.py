@@ -53,6 +53,15 @@ def efase_file(small_corpus, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def anime_file(small_corpus, tmp_path_factory):
+    from facesynth.methods.anime_graph.method import AnimeGraph
+
+    path = tmp_path_factory.mktemp("models") / "anime_graph.safetensors"
+    AnimeGraph(map_centres=40, emotional_components=[0, 2]).fit(small_corpus).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
 def emotion_file(small_corpus, tmp_path_factory):
     from facesynth.methods.emotion.clips import clips_of_corpus
     from facesynth.methods.emotion.detector import EmotionDetector

@@ -166,7 +166,7 @@ class Search:
         return i[row], column, squared[row, column], switch[row]
 
     def _improve(self, t: int, i: Ints, k: Ints, step: Floats, best: Floats, origin: Ints) -> Iterator[Request]:
-        """Take pairs (i, k) of known step costs into account; predecessors that are only bounded are asked for, the best first."""
+        """Take pairs (i, k) of known step costs into account; those that are only bounded are asked for, the best first."""
         phi, known = self.phi[t - 1], self.known[t - 1]
         left = np.ones(len(i), bool)
         while True:

@@ -13,7 +13,7 @@ from facesynth_runtime.errors import RuntimeInputError
 from facesynth_runtime.tracks import SILENCE, frame_bounds
 
 if TYPE_CHECKING:
-    from facesynth_runtime.efase.model import Efase, Stretch
+    from facesynth_runtime.efase.model import Efase
 
 GUARD_S = 0.4
 """Smoothing of intensities (0.32 s) and of closed lips reaches no farther, the filters of another frame rate hardly."""
@@ -40,8 +40,7 @@ class EfaseStream:
         self.paths: list[list[int]] = [[] for _ in range(self.plans)]
         self.frames_out = 0
         self._neutral = NEUTRAL
-        self._new = lambda: Stretch(model.nodes, look_ahead)
-        self._stretches: list[Stretch] = [self._new() for _ in range(self.plans)]
+        self._stretches = [Stretch(model.nodes, look_ahead) for _ in range(self.plans)]
 
     def push(self, phone: str, end_s: float, emotion: str, intensity: float = 1.0) -> NDArray[np.float32]:
         """The next phone, to its end in seconds; the frames that became final, possibly none."""
@@ -82,7 +81,7 @@ class EfaseStream:
     def _end_stretch(self) -> None:
         for path, stretch in zip(self.paths, self._stretches, strict=True):
             path.extend(stretch.finish()[len(stretch.settled) :].tolist())
-        self._stretches = [self._new() for _ in range(self.plans)]
+        self._stretches = [type(stretch)(self.model.nodes, self.look_ahead) for stretch in self._stretches]
 
     def _emit(self, *, last: bool) -> NDArray[np.float32]:
         known = min(len(path) for path in self.paths)
