@@ -17,7 +17,7 @@ from facesynth.speech.speech import PhoneTrack
 
 Floats = NDArray[np.float64]
 
-NEIGHBOURS = 8
+NEIGHBOURS = 14
 """So many nearest neighbours of a marker may be mistaken for it."""
 CLOSEST_MM = 3.0
 """Markers that lie nearer at rest, such as lips that touch, change sides by themselves."""

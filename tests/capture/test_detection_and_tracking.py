@@ -127,3 +127,20 @@ def test_a_real_face_is_found_upright_tilted_and_small_and_two_are_two(models, r
     (small,) = detector.faces(far)
     assert small.square.x_px == pytest.approx(face.square.x_px + 300, abs=12)
     assert Tracker().follow(np.zeros_like(image)) is None
+
+
+@pytest.mark.slow
+def test_ten_clips_of_a_real_talker_agree_in_points_and_in_the_opening_of_the_lips(models, recordings):
+    off, alike = [], []
+    for clip in sorted(recordings("grid_s26").glob("*.mpg")):
+        recorded = np.load(clip.with_name(f"{clip.stem}_mediapipe.npz"))
+        theirs = recorded["landmarks"][..., :2] * [360, 288]
+        ours = kept_track(clip).points_px[recorded["frame"] - 1, :, :2]
+        eyes_px = np.linalg.norm(theirs[:, 33] - theirs[:, 263], axis=1)
+        off.append(np.nanmedian(np.linalg.norm(ours - theirs[:, :468], axis=2) / eyes_px[:, None]))
+        gaps = [(points[:, 14, 1] - points[:, 13, 1]) / eyes_px for points in (ours, theirs)]
+        known = np.isfinite(gaps[0])
+        alike.append(np.corrcoef(gaps[0][known], gaps[1][known])[0, 1])
+    assert len(off) == 10
+    assert np.median(off) < 0.025
+    assert np.median(alike) >= 0.88

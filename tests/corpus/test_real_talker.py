@@ -1,0 +1,76 @@
+"""What capture makes of a real talker: the mouth follows that talker's own sound, and the built-in head follows the mouth."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facesynth.capture.models import MODELS, _kept
+from facesynth.corpus.add import add
+from facesynth.corpus.check_sync import LAGS, RATE, correlations, mouth_opening
+from facesynth.corpus.importers.video import corpus_from_video
+from facesynth.corpus.workers import Workers
+from facesynth.motion.lips import lip_gap
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    from conftest import RECORDINGS
+
+    if not (RECORDINGS / "grid_s1").is_dir():
+        pytest.skip("real recordings 'grid_s1' are not here")
+    if not all(_kept(name).is_file() for name in MODELS):
+        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
+    sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
+    videos = sorted((RECORDINGS / "grid_s1").glob("*.mpg"))[::5]
+    made = corpus_from_video(tmp_path_factory.mktemp("s1") / "c", videos, {"performer": "s1", "emotions": ["neutral"]})
+    from grid import sentence
+
+    report = add(made, videos, texts={video.stem: sentence(video.stem) for video in videos}, workers=Workers(1))
+    assert len(report.added) >= 0.95 * len(videos), report.refused
+    return made
+
+
+@pytest.mark.slow
+def test_lips_follow_the_sound_better_than_any_of_a_thousand_shuffled_pairings(corpus):
+    openings, levels = [], []
+    for utterance in corpus:
+        opening = mouth_opening(utterance.motion)
+        if not np.isfinite(opening).all():
+            continue
+        speech = utterance.speech
+        power = np.convolve(speech.audio.astype(float) ** 2, np.hanning(int(0.06 * speech.sample_rate)), "same")
+        times_s = np.arange(int(speech.duration_s * RATE)) / RATE
+        at = np.minimum((times_s * speech.sample_rate).astype(int), len(power) - 1)
+        levels.append(np.log(np.sqrt(power[at]) + 1e-3))
+        openings.append(np.interp(times_s * utterance.motion.fps, np.arange(len(opening)), opening))
+    count = min(map(len, openings))
+    mouths, sounds = (np.array([row[:count] for row in rows]) for rows in (openings, levels))
+    best_ms = [1000 * LAGS[correlations(sound, mouth).argmax()] / RATE for sound, mouth in zip(sounds, mouths, strict=True)]
+    assert abs(np.median(best_ms)) <= 80
+    normal = [(rows - rows.mean(axis=1, keepdims=True)) / rows.std(axis=1, keepdims=True) for rows in (mouths, sounds)]
+    table = normal[0] @ normal[1].T / count
+    own = np.median(np.diag(table))
+    rng = np.random.default_rng(0)
+    shuffled = [np.median(table[np.arange(len(table)), rng.permutation(len(table))]) for _ in range(1000)]
+    assert (1 + sum(value >= own for value in shuffled)) / 1001 < 0.01
+
+
+@pytest.mark.slow
+def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
+    pytest.importorskip("anny", reason="the head is not installed")
+    from facesynth.face.animation import animate
+    from facesynth.face.markers import LipGap
+    from facesynth.face.rig import load_head
+
+    rig = load_head()
+    alike, off_mm = [], []
+    for utterance in list(corpus)[:10]:
+        if np.isfinite(utterance.motion.frames).all() and np.isfinite(utterance.motion.head).all():
+            animation = animate(utterance.motion, rig)
+            shown = LipGap.of(rig).opening_mm(animation.weights)
+            alike.append(np.corrcoef(shown, lip_gap(utterance.motion)[: len(shown)])[0, 1])
+            off_mm.append(animation.residual_mm.mean())
+    assert np.median(alike) > 0.97
+    assert np.median(off_mm) < 1.5
