@@ -74,6 +74,8 @@ def evaluate(
     team = Workers(workers, engine, address)
     require_drawing()
     recordings = Corpus.open(corpus)
+    for utterance_id in shown:
+        recordings.record(utterance_id)
     known, contestants = _contestants(methods, families, references=not no_references)
     splits: Sequence[Fold] | None = read_folds(given_folds, recordings) if given_folds else None
     if stored is None:

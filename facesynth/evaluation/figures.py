@@ -86,9 +86,9 @@ def face_figure(details: Mapping[str, Details], face: PointFace, unit: str) -> s
     """The mean error of every point, as colour on the face; as bars for curves."""
     shown = {label: one.points for label, one in details.items() if one.points.size and np.isfinite(one.points).any()}
     worst = max((float(np.nanmax(points)) for points in shown.values()), default=1.0)
-    columns = min(max(len(shown), 1), 5)
+    columns = min(max(len(shown), 1), 4)
     rows = -(-max(len(shown), 1) // columns)
-    figure, axes = new_figure(11, 3.1 * rows if not len(face.bars) else 4.6 * rows, rows, columns)
+    figure, axes = new_figure(11, 3.4 * rows if not len(face.bars) else 4.6 * rows, rows, columns)
     for axis in axes.ravel()[len(shown) :]:
         axis.axis("off")
     drawn = None

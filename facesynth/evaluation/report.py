@@ -81,6 +81,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "main": table(comparison, result.main_columns()),
         "whole": table(comparison, [column.name for column in comparison.columns]),
         "notes": comparison.markdown(result.main_columns()).split("\n\n")[1:],
+        "whole_notes": comparison.markdown().split("\n\n")[1:],
         "verdicts": verdicts(result),
         "statements": statements(result.differences),
         "differences": result.differences,

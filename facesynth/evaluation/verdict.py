@@ -46,7 +46,7 @@ def _verdict(result: Evaluation, label: str) -> Verdict:
             f" ({'told apart' if sure else 'not told apart'})"
         )
     why = "" if good else " " + reason(result, label)
-    return Verdict(label, good, f"{'better than' if good else 'NOT better than'} the mean face: {'; '.join(parts)}.{why}")
+    return Verdict(label, good, f"{'; '.join(parts)}.{why}")
 
 
 def reason(result: Evaluation, label: str) -> str:

@@ -1,0 +1,62 @@
+import json
+
+import pytest
+from click.testing import CliRunner
+from corpora import tiny_corpus
+
+from facesynth.cli.evaluate import evaluate
+from facesynth.cli.reproduce import reproduce
+from facesynth.errors import FacesynthError
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("tiny") / "corpus", utterances=12, fps=30).path
+
+
+@pytest.fixture(scope="module")
+def family(tmp_path_factory):
+    path = tmp_path_factory.mktemp("family") / "pm.yaml"
+    path.write_text(
+        "title: Phone means\nmethod: phone_mean\naxis: minutes\nvariants: {few: {minutes: 0.05}, many: {minutes: 9}}\n"
+    )
+    return path
+
+
+def run(*arguments, command=evaluate):
+    return CliRunner().invoke(command, [str(a) for a in arguments], catch_exceptions=False)
+
+
+def test_one_command_makes_a_report_and_its_predictions_make_it_again(corpus, family, tmp_path):
+    made = run(corpus, "mean_face", "--family", family, "--folds", 2, "--no-references", "--no-video", "-o", tmp_path / "a")
+    assert made.exit_code == 0
+    assert "| few |" in made.output
+    again = run(
+        corpus,
+        "--from-predictions",
+        tmp_path / "a" / "predictions",
+        "--family",
+        family,
+        "--no-video",
+        "-o",
+        tmp_path / "b",
+        "--json",
+    )
+    for name in ("table.csv", "utterances.csv", "comparisons.csv", "phones.csv", "trade.csv", "points.csv"):
+        rows = [sorted((tmp_path / part / name).read_text().splitlines()) for part in "ab"]
+        assert rows[0] == rows[1] or name == "comparisons.csv"
+    assert {row["label"] for row in json.loads(again.output)["rows"]} == {"second take", "mean_face", "few", "many"}
+
+
+def test_what_is_wrong_is_said(corpus, tmp_path):
+    assert "name a method" in run(corpus, "-o", tmp_path).output
+    with pytest.raises(FacesynthError, match="ridge"):
+        run(corpus, "rigde", "-o", tmp_path)
+    with pytest.raises(FacesynthError, match="no such folder"):
+        run(corpus, "--from-predictions", tmp_path / "nowhere", "-o", tmp_path)
+    with pytest.raises(FacesynthError, match="unknown utterance"):
+        run(corpus, "ridge", "--show", "nobody", "-o", tmp_path)
+    with pytest.raises(FacesynthError, match="engine"):
+        run(corpus, "ridge", "--engine", "rya", "-o", tmp_path)
+    with pytest.raises(FacesynthError, match="output type"):
+        run("deng2008", corpus, "-o", tmp_path / "x.doc", command=reproduce)

@@ -1,0 +1,164 @@
+import csv
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from corpora import tiny_corpus, tiny_layout, tiny_utterances
+
+from facesynth.corpus import Corpus
+from facesynth.evaluation.compare import evaluate
+from facesynth.evaluation.contestants import Contestant, Family
+from facesynth.evaluation.exports import escape
+from facesynth.evaluation.folds import make_folds
+from facesynth.evaluation.point_face import PointFace
+from facesynth.evaluation.report import PAGE, Wish, typical, write_report
+from facesynth.evaluation.verdict import verdicts
+from facesynth.face.video import read_video
+from facesynth.methods.baselines.mean_face import MeanFace
+from facesynth.methods.registry import register
+from facesynth.motion.layout import Layout
+from facesynth.motion.motion import Motion
+
+FILES = "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv report.json"
+FAMILY = Family("By minutes", ("phone mean", "little"), "minutes", (9.0, 0.05))
+
+
+@register("wrong_face")
+class WrongFace(MeanFace):
+    """A face that is held wrongly and shakes."""
+
+    def synthesize(self, speech, *, seed=0, **options):
+        motion = super().synthesize(speech)
+        shaking = 6 + 2 * np.sin(np.arange(len(motion)))[:, None]
+        return Motion(motion.frames + shaking, motion.fps, motion.layout)
+
+
+METHODS = (
+    Contestant("phone mean", "phone_mean"),
+    Contestant("little", "phone_mean", minutes=0.05),
+    Contestant("mean face", "mean_face"),
+    Contestant("wrong", "wrong_face"),
+)
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("tiny") / "corpus", utterances=12, fps=30)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("report")
+
+
+@pytest.fixture(scope="module")
+def result(corpus, folder):
+    return evaluate(METHODS, corpus, make_folds(corpus, 2), folder)
+
+
+@pytest.fixture(scope="module")
+def page(corpus, folder, result):
+    return write_report(folder, result, corpus, [FAMILY], Wish("Tiny & <small>", corpus.ids[:1])).read_text(encoding="utf-8")
+
+
+def test_the_page_needs_nothing_but_itself(page):
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert sources
+    assert all(source.startswith(("data:", "#")) for source in sources)
+    assert "default-src 'none'" in page
+    assert "<script" not in page
+    assert "Tiny &amp; &lt;small&gt;" in page
+
+
+def test_every_part_is_there(page):
+    parts = "main mean-face apart trade families shown face residuals confusions phones emotions all made"
+    for part in parts.split():
+        assert f'id="{part}"' in page
+    assert page.count("data:video/mp4;base64,") == 1
+    assert page.count("data:image/svg+xml;base64,") >= 5
+
+
+def test_a_method_that_loses_to_the_mean_face_is_named_with_the_reason(result, page):
+    said = {one.label: one for one in verdicts(result)}
+    assert said["phone mean"].good
+    assert not said["wrong"].good
+    assert "MORE than the mean face" in said["wrong"].text
+    assert "the pose that it holds is wrong to begin with" in said["wrong"].text
+    assert "NOT better than the mean face" in page
+
+
+def test_what_it_was_made_from_is_said(page, corpus):
+    assert corpus.provenance()["sha256"] in page
+    assert "numpy" in page
+    assert "torch" in page
+
+
+def test_the_same_figures_as_files(folder, result, page):
+    assert all((folder / name).stat().st_size > 0 for name in FILES.split())
+    whole = json.loads((folder / "report.json").read_text(), parse_constant=pytest.fail)
+    assert whole["families"][0]["labels"] == ["phone mean", "little"]
+    assert whole["folds"][0]["test"]
+    assert whole["made_of"]["little"][0]["train_minutes"] < whole["made_of"]["phone mean"][0]["train_minutes"]
+    lines = list(csv.DictReader(io.StringIO((folder / "utterances.csv").read_text())))
+    assert len(lines) == 5 * len(result.comparison.utterances)
+    mean = np.mean([float(line["lve"]) for line in lines if line["method"] == "little"])
+    assert mean == pytest.approx(result.comparison.scores["little"]["lve"].mean, rel=1e-6)
+
+
+def test_the_latex_table_balances_and_escapes(folder, result):
+    text = (folder / "table.tex").read_text()
+    body = [line for line in text.splitlines() if line.endswith(r"\\")]
+    assert len({line.count("&") for line in body}) == 1
+    assert len(body) == 1 + len(result.comparison.rows)
+    assert r"lip\_gap\_corr" in text
+    assert text.count("{") == text.count("}")
+    assert escape(r"50 % of \a_b & c{") == r"50 \% of \textbackslash{}a\_b \& c\{"
+
+
+def test_the_same_result_gives_the_same_page(corpus, folder, result, page, tmp_path):
+    write_report(tmp_path, result, corpus, [FAMILY], Wish("Tiny & <small>", corpus.ids[:1]))
+    assert (tmp_path / PAGE).read_text(encoding="utf-8") == page
+
+
+def test_chosen_utterances_are_shown_and_the_video_plays(corpus, result, page, tmp_path):
+    import base64
+
+    chosen = corpus.ids[0]
+    assert f"<h3>{chosen}" in page
+    video = re.search(r"data:video/mp4;base64,([^\"]*)", page)[1]
+    (tmp_path / "v.mp4").write_bytes(base64.b64decode(video))
+    read = read_video(tmp_path / "v.mp4")
+    assert len(read.frames) == round(corpus[chosen].motion.duration_s * 25)
+    assert len(read.audio)
+    assert np.ptp(read.frames[0].astype(int)) > 100
+    assert typical(result)[0] in result.comparison.utterances
+
+
+def test_curves_have_a_page_too(tmp_path):
+    names = ("jawOpen", "mouthClose", "mouthPucker", "browInnerUp")
+    layout = Layout("curves", names, {"mouth": (0, 1, 2)})
+    corpus = Corpus.create(
+        tmp_path / "c", performer="Curves", layout=layout, fps=30, emotions=("neutral", "happy", "angry", "sad")
+    )
+    column = tiny_layout().names.index("lip_lower") * 3 + 1
+    for record, speech, motion in tiny_utterances(6, 30):
+        opening = np.clip((-51 - motion.frames[:, column]) / 15, 0, 1)
+        frames = np.stack([opening, 0.2 * opening, 0.5 - 0.5 * opening, 0.1 + 0 * opening], axis=1)
+        corpus.add_utterance(record, speech, Motion(frames, 30, layout))
+    result = evaluate(METHODS[::2], corpus, make_folds(corpus, 2), tmp_path / "r")
+    page = write_report(tmp_path / "r", result, corpus, [], Wish("Curves")).read_text()
+    assert "weight" in page
+    assert page.count("data:video/mp4") == 2
+
+
+def test_a_picture_reddens_where_it_is_wrong():
+    layout = tiny_layout()
+    rest = np.array(layout.neutral)
+    face = PointFace.of(layout, rest[None])
+    plain = face.picture(rest, (120, 140)).astype(int)
+    wrong = face.picture(rest, (120, 140), np.full(len(layout.names), 3.0), 3.0).astype(int)
+    assert (plain[..., 0] - plain[..., 2]).max() < 60
+    assert (wrong[..., 0] - wrong[..., 2]).max() > 100
+    assert np.array_equal(plain, face.picture(rest, (120, 140), np.zeros(len(layout.names)), 3.0))
