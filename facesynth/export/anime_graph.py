@@ -50,7 +50,7 @@ def anime_graph_content(model: AnimeGraph) -> Content:
         },
         latency={
             "look_ahead_s": None,
-            "about": "synthesize searches the whole utterance, or look_ahead=n phones; a stream looks n phones ahead. Frames follow "
+            "about": "synthesize searches the whole utterance, or look_ahead=n phones; a stream looks n ahead. Frames follow "
             "0.8 s after the second node after theirs is settled",
         },
         sample_rate=RATE,

@@ -38,6 +38,16 @@ class Builder:
         self._inputs.append(helper.make_tensor_value_info(name, TYPES[dtype], list(shape)))
         return name
 
+    def bool_input(self, name: str) -> str:
+        """Declare a truth value, as the body of a Loop takes."""
+        self._inputs.append(helper.make_tensor_value_info(name, TensorProto.BOOL, []))
+        return name
+
+    def bool_output(self, value: str, name: str) -> None:
+        """Declare a truth value to be an output."""
+        self._nodes.append(helper.make_node("Identity", [value], [name]))
+        self._outputs.append(helper.make_tensor_value_info(name, TensorProto.BOOL, []))
+
     def output(self, value: str, name: str, dtype: str, shape: Shape) -> None:
         """Declare a value to be an output called `name`."""
         self._nodes.append(helper.make_node("Identity", [value], [name]))

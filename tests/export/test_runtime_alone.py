@@ -1,0 +1,137 @@
+"""The runtime with nothing but numpy and onnxruntime."""
+
+import json
+import os
+import subprocess
+import sys
+import wave
+
+import numpy as np
+import pytest
+from corpora import RATE
+from facesynth_runtime import RuntimeInputError
+from facesynth_runtime.__main__ import main
+
+from facesynth.export.graph import difference
+from facesynth.methods.registry import load as load_torch
+
+STRANGERS = ("torch", "torchaudio", "kornia", "sklearn", "scipy", "numba", "facesynth", "safetensors", "librosa", "soundfile")
+MOST_BYTES = 180e6
+
+SPEAK = """
+import sys, json
+refused = set(sys.argv[1].split(","))
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in refused:
+            raise ImportError(name + " is not part of the runtime")
+sys.meta_path.insert(0, Refuse())
+import numpy as np
+from facesynth_runtime import EmotionTrack, PhoneTrack, Speech, load
+asked = np.load(sys.argv[2])
+phones = PhoneTrack(tuple(asked["labels"].tolist()), asked["ends_s"])
+speech = Speech(asked["audio"], int(asked["rate"]), phones, EmotionTrack.constant(str(asked["emotion"]), phones.duration_s))
+out = {}
+for folder in sys.argv[4:]:
+    model = load(folder)
+    if hasattr(model, "detect"):
+        out["emotion"] = np.array(list(model.detect(speech.audio, speech.sample_rate).probabilities.values()))
+    else:
+        out[model.manifest["method"]] = model.synthesize(speech, seed=5).frames
+assert not refused & {name.split(".")[0] for name in sys.modules}
+np.savez(sys.argv[3], **out)
+"""
+
+
+@pytest.fixture(scope="module")
+def folders(lds_file, efase_file, anime_file, emotion_file, exported):
+    return [exported(path) for path in (lds_file, efase_file, anime_file, emotion_file)]
+
+
+@pytest.fixture(scope="module")
+def asked(speeches, tmp_path_factory):
+    speech = speeches[1]
+    path = tmp_path_factory.mktemp("asked") / "speech.npz"
+    labels, emotion = np.array(speech.phones.labels), speech.emotions.labels[0]
+    np.savez(path, audio=speech.audio, rate=RATE, labels=labels, ends_s=speech.phones.ends_s, emotion=emotion)
+    return path
+
+
+def compare(answers, speech, lds_file, efase_file, anime_file, emotion_file):
+    from facesynth.methods.emotion.detector import EmotionDetector
+
+    with np.load(answers) as got:
+        for path in (lds_file, efase_file, anime_file):
+            model = load_torch(path)
+            assert difference(got[model.name], model.synthesize(speech, seed=5).frames) < 1e-4, model.name
+        wanted = EmotionDetector.load(emotion_file).detect(speech.audio, RATE).probabilities
+        assert np.allclose(got["emotion"], list(wanted.values()), rtol=1e-4)
+
+
+def test_every_method_speaks_where_torch_cannot_be_imported(
+    folders, asked, speeches, runtime_folder, tmp_path, lds_file, efase_file, anime_file, emotion_file
+):
+    answers, own = tmp_path / "answers.npz", {**os.environ, "PYTHONPATH": str(runtime_folder)}
+    command = [sys.executable, "-c", SPEAK, ",".join(STRANGERS), str(asked), str(answers), *map(str, folders)]
+    subprocess.run(command, check=True, env=own, cwd=tmp_path, timeout=120)
+    compare(answers, speeches[1], lds_file, efase_file, anime_file, emotion_file)
+
+
+@pytest.mark.slow
+def test_an_environment_with_only_that_distribution(
+    folders, asked, speeches, runtime_folder, tmp_path, lds_file, efase_file, anime_file, emotion_file
+):
+    home = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", str(home)], check=True, timeout=120)
+    python = home / ("Scripts" if os.name == "nt" else "bin") / "python"
+    base = sum(path.stat().st_size for path in home.rglob("*") if path.is_file() and not path.is_symlink())
+    done = subprocess.run(
+        [python, "-m", "pip", "install", "-q", str(runtime_folder)], capture_output=True, text=True, timeout=600
+    )
+    if done.returncode:
+        pytest.skip(f"numpy and onnxruntime cannot be installed here: {done.stderr.strip().splitlines()[-1:]}")
+    size = sum(path.stat().st_size for path in home.rglob("*") if path.is_file() and not path.is_symlink()) - base
+    listed = subprocess.run(
+        [python, "-m", "pip", "list", "--format=json"], capture_output=True, text=True, check=True, timeout=60
+    )
+    names = {entry["name"].lower() for entry in json.loads(listed.stdout)}
+    assert not names & {"torch", "torchaudio", "kornia", "scikit-learn", "scipy", "facesynth"}
+    print(f"installed: {size / 1e6:.0f} MB, {sorted(names)}")
+    assert size < MOST_BYTES
+    answers = tmp_path / "answers.npz"
+    command = [python, "-c", SPEAK, ",".join(STRANGERS), str(asked), str(answers), *map(str, folders)]
+    subprocess.run(command, check=True, cwd=tmp_path, timeout=120)
+    compare(answers, speeches[1], lds_file, efase_file, anime_file, emotion_file)
+
+
+def test_nothing_in_the_source_names_torch(runtime_folder):
+    import ast
+
+    for path in (runtime_folder / "facesynth_runtime").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", None) or ""]
+            assert not {name.split(".")[0] for name in names} & set(STRANGERS), path
+
+
+def test_the_command_line(folders, speeches, tmp_path, capsys):
+    sound, phones = tmp_path / "line.wav", tmp_path / "line.txt"
+    with wave.open(str(sound), "wb") as file:
+        file.setparams((1, 2, RATE, 0, "NONE", ""))
+        file.writeframes((speeches[0].audio * 32767).astype("<i2").tobytes())
+    track = speeches[0].phones
+    phones.write_text("".join(f"{end} {label}\n" for label, end in zip(track.labels, track.ends_s, strict=True)))
+    main([str(folders[1]), str(sound), "--phones", str(phones), "-o", str(tmp_path / "motion.npz")])
+    with np.load(tmp_path / "motion.npz") as motion:
+        assert motion["frames"].shape == (round(track.duration_s * 60), 42)
+    main([str(folders[3]), str(sound)])
+    assert set(json.loads(capsys.readouterr().out)) == {"neutral", "happy", "angry", "sad"}
+    with pytest.raises(SystemExit, match="2"):
+        main([str(tmp_path), str(sound)])
+    assert "manifest.json: no such file" in capsys.readouterr().err
+
+
+def test_threads_are_at_least_one(folders):
+    from facesynth_runtime import load
+
+    with pytest.raises(RuntimeInputError, match="threads is 0"):
+        load(folders[0], threads=0)
