@@ -10,6 +10,7 @@ import numpy as np
 
 from facesynth.errors import FacesynthError
 
+LARGEST_BYTES = 2**31
 ARRAYS = ("frames", "head", "eyes", "fps")
 
 
@@ -17,16 +18,28 @@ def read_npz(path: Path) -> dict[str, Any]:
     """Those of the arrays frames, head, eyes and the number fps that a file holds; it must hold frames. Never unpickles."""
     if not path.is_file():
         raise FacesynthError(f"{path} is missing")
+    require_modest(path)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays: dict[str, Any] = {name: stored[name] for name in ARRAYS if name in stored}
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, MemoryError, zipfile.BadZipFile) as error:
         raise FacesynthError(f"{path} is not a motion file, or is damaged ({error}); write it again with numpy.savez") from None
     if "frames" not in arrays:
         raise FacesynthError(f"{path} holds no array 'frames'; write it with numpy.savez(file, frames=…, fps=…)")
     if "fps" in arrays:
         arrays["fps"] = _number(path, arrays["fps"])
     return arrays
+
+
+def require_modest(path: Path) -> None:
+    """FacesynthError for an archive that would unpack to more than one recording can be; what is no archive passes."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError):
+        return
+    if size > LARGEST_BYTES:
+        raise FacesynthError(f"{path} would unpack to {size / 1e9:.1f} GB, more than one recording can be; split it")
 
 
 def _number(path: Path, value: Any) -> float:

@@ -1,5 +1,6 @@
 import resource
 import struct
+import zipfile
 from contextlib import suppress
 
 import numpy as np
@@ -232,6 +233,19 @@ def fuzz(whole_files, tmp_path, trials):
                 read(target, None if path.stem in OWN_LAYOUT else LAYOUT, fps=60)
     grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb) / 1024
     assert grown_mb < 400, "a damaged file of some kilobytes must not take memory by what it claims"
+
+
+def test_an_archive_that_would_unpack_to_gigabytes_is_refused_unread(tmp_path, monkeypatch):
+    monkeypatch.setattr("facesynth.corpus.npz.LARGEST_BYTES", 2**27)
+    path = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("frames.npy", "w", force_zip64=True) as entry:
+        for _ in range(12):
+            entry.write(bytes(2**24))
+    assert path.stat().st_size < 2**20
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(FacesynthError, match="more than one recording can be"):
+        read(path, LAYOUT, fps=60)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 100_000
 
 
 def fuzz_video(tmp_path, trials):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.motion_files import load_motion
+from facesynth.corpus.npz import require_modest
 from facesynth.errors import FacesynthError
 from facesynth.motion.layout import Layout
 
@@ -66,6 +67,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _npz(path: Path) -> dict[str, NDArray[Any]]:
+    require_modest(path)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             if not hasattr(stored, "files"):
