@@ -1,3 +1,4 @@
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -144,3 +145,23 @@ def test_ten_clips_of_a_real_talker_agree_in_points_and_in_the_opening_of_the_li
     assert len(off) == 10
     assert np.median(off) < 0.025
     assert np.median(alike) >= 0.88
+
+
+def test_of_two_talkers_side_by_side_one_must_be_chosen(models, recordings, tmp_path):
+    from facesynth.capture.video import open_video
+
+    beside = []
+    for name in ("bgbsza", "lrbi7p"):
+        with open_video(recordings("grid_s26") / f"{name}.mpg") as video:
+            beside.append([image for _, image in itertools.islice(video.images, 30)])
+    images = [np.hstack(pair) for pair in zip(*beside, strict=True)]
+    path = write_video(tmp_path / "two.mp4", images)
+    with pytest.raises(FacesynthError, match="--face"):
+        track_face(path)
+    left, right = (track_face(path, face) for face in (1, 2))
+    for track, low in ((left, 0), (right, 360)):
+        middle = np.nanmedian(track.points_px[:, 4, 0])
+        assert low < middle < low + 360
+    assert np.nanmedian(left.points_px[:, 4, 0]) < np.nanmedian(right.points_px[:, 4, 0])
+    with pytest.raises(FacesynthError, match="3"):
+        track_face(path, 3)
