@@ -180,9 +180,9 @@ def test_facegood_comes_in_and_out_as_curves(recordings, tmp_path):
     truth = corpus[added[0]].motion
     count = min(len(told), len(truth))
     error = np.sqrt(np.square(told.frames[:count] - truth.frames[:count]).mean())
-    assert error < 0.04
+    assert error < 0.027
     jaw = int(np.argmax(truth.frames.std(axis=0)))
-    assert np.corrcoef(told.frames[:count, jaw], truth.frames[:count, jaw])[0, 1] > 0.3
+    assert np.corrcoef(told.frames[:count, jaw], truth.frames[:count, jaw])[0, 1] > 0.6
 
 
 def test_beat2_gives_head_and_eyes_with_speech(recordings, tmp_path):
