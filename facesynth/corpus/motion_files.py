@@ -56,6 +56,18 @@ def channel_names(layout: Layout) -> tuple[str, ...]:
     return tuple(f"{name}.{axis}" for name in layout.names for axis in AXES[: layout.dimension])
 
 
+def own_rate(path: str | Path) -> float:
+    """The rate, Hz, of a CSV with the column `time_s`."""
+    columns, table = _table(Path(path))
+    if TIME not in columns:
+        raise FacesynthError(f"{path} has no column {TIME}, so its rate is not known")
+    times_s = table[:, columns.index(TIME)]
+    span_s = float(times_s[-1] - times_s[0]) if len(times_s) > 1 else 0.0
+    if not span_s > 0:
+        raise FacesynthError(f"{path}: the column {TIME} does not go up; resample the motion first")
+    return _rate(Path(path), times_s, (len(times_s) - 1) / span_s)
+
+
 def _from_csv(path: Path, layout: Layout, fps: float) -> dict[str, Any]:
     columns, table = _table(path)
     wanted = channel_names(layout)

@@ -149,6 +149,26 @@ def test_any_table_with_a_layout(tmp_path, kind):
     assert np.abs(motion.points - points).max() < 1e-5
 
 
+def test_curves_that_name_themselves_need_no_layout(tmp_path):
+    values = np.random.default_rng(5).uniform(-1, 2, (50, 2)).astype(np.float32)
+    from facesynth.face.files.curves import write_curves
+
+    write_curves(tmp_path / "a.csv", ("jaw", "brow up"), values, 60.0)
+    np.savez(tmp_path / "b.npz", names=np.array(["jaw", "brow up"]), weights=values, fps=60.0)
+    for name in ("a.csv", "b.npz"):
+        motion = read(tmp_path / name).motion
+        assert motion.layout == Layout("curves", ("jaw", "brow up"))
+        assert motion.fps == pytest.approx(60.0, rel=1e-3)
+        np.testing.assert_array_equal(motion.frames, values)
+    for header in ("chin.x,chin.y,chin.z", "0.5,0.25", "a,a"):
+        (tmp_path / "c.csv").write_text(f"{header}\n" + ",".join("1" for _ in header.split(",")) + "\n")
+        with pytest.raises(FacesynthError, match="does not name its channels"):
+            read(tmp_path / "c.csv", fps=30)
+    (tmp_path / "d.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(FacesynthError, match="does not state its rate"):
+        read(tmp_path / "d.csv")
+
+
 def test_what_does_not_say_enough_says_so(tmp_path):
     np.savez(tmp_path / "a.npz", weights=np.zeros((3, 2)))
     with pytest.raises(FacesynthError, match="does not name its channels"):
