@@ -35,7 +35,7 @@ def stored_as(content: Content, weights: Weights) -> Content:
     scales = {
         f"{name}_scale": _scale(array) for name, array in content.arrays.items() if name in SMALLER_ARRAYS and weights == "int8"
     }
-    settings = {**content.settings, "weights": weights}
+    settings = {**content.settings, "stored_as": weights}
     return replace(content, graphs=graphs, arrays={**arrays, **scales}, settings=settings)
 
 

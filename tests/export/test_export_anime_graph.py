@@ -93,6 +93,16 @@ def test_warps_are_those_of_facesynth(seed):
     assert np.array_equal(warp_path(wanted, features[:7]), torch_path(wanted, features[:7]))
 
 
+def test_fewer_bits_are_smaller_and_move_nearly_the_same(anime_file, exported, pair, speeches):
+    smaller = load(exported(anime_file, "float16"))
+    full = sum(path.stat().st_size for path in exported(anime_file).iterdir())
+    assert sum(path.stat().st_size for path in exported(anime_file, "float16").iterdir()) < 0.7 * full
+    same = np.mean(smaller.plan(speeches[0]).nodes == pair[1].plan(speeches[0]).nodes)
+    assert same > 0.7
+    if same == 1:
+        assert difference(smaller.synthesize(speeches[0]).frames, pair[1].synthesize(speeches[0]).frames) < 0.01
+
+
 def test_what_is_wrong_is_named(pair, speeches):
     _, runtime = pair
     with pytest.raises(RuntimeInputError, match="8000 Hz; wanted 16000 Hz"):

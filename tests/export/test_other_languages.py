@@ -1,0 +1,157 @@
+"""The same folder from JavaScript: in Node, and in a page of a real browser with the network cut off."""
+
+import base64
+import functools
+import http.server
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from facesynth_runtime import load
+
+from facesynth.corpus import Corpus, Record
+from facesynth.methods.lds.method import LDS
+from facesynth.motion.motion import Motion
+from facesynth.speech.audio import save_wav
+from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+RATE, FPS = 16000, 30
+WAIT_S = 90
+
+
+def spoken(loudness, rng):
+    """Syllables of noise as loud as told, a fifth of a second each."""
+    audio = 0.2 * rng.standard_normal(len(loudness) * RATE // 5) * np.repeat(loudness, RATE // 5)
+    seconds = len(audio) / RATE
+    track = EmotionTrack.constant("neutral", seconds)
+    return Speech(audio.astype(np.float32), RATE, PhoneTrack(("pau",), np.array([seconds])), track)
+
+
+@pytest.fixture(scope="module")
+def talking_head(tmp_path_factory):
+    """A system that opens the built-in head's jaw where the sound is loud, and a sound."""
+    pytest.importorskip("anny", reason="the built-in head is not installed")
+    from facesynth.face.markers import marker_layout, marker_vertices
+    from facesynth.face.rig import load_head, pose_points
+
+    rig, rng, home = load_head(), np.random.default_rng(0), tmp_path_factory.mktemp("head")
+    layout = marker_layout(rig)
+    corpus = Corpus.create(home / "corpus", performer="Jaw", layout=layout, fps=FPS, emotions=("neutral",), synthetic=True)
+    for clip in range(6):
+        loudness = rng.uniform(0, 1, 15)
+        weights = np.zeros((90, 52))
+        weights[:, rig.index("jawOpen")[0]] = 0.5 * np.convolve(np.repeat(loudness, 6), [0.2, 0.5, 0.3], "same")
+        weights[:, rig.index("mouthSmileLeft", "mouthSmileRight")] = 0.1 * rng.uniform(0, 1, (90, 1))
+        frames = pose_points(rig, marker_vertices(rig, layout), weights).reshape(90, -1)
+        corpus.add_utterance(Record(f"c{clip}", sentence=f"c{clip}"), spoken(loudness, rng), Motion(frames, FPS, layout))
+    quick = {"features": 4, "components": 2, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
+    LDS(**quick).fit(corpus).save(home / "lds.safetensors")
+    save_wav(home / "speech.wav", spoken(np.array([0, 1, 0.2, 0.8, 0.1, 1, 0]), rng).audio, RATE)
+    return home / "lds.safetensors", home / "speech.wav"
+
+
+def installed(example):
+    """The example's folder with what npm installs; skips where that cannot be had."""
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("npm is not installed")
+    folder = EXAMPLES / example
+    if not (folder / "node_modules" / "onnxruntime-web").is_dir():
+        command = [npm, "install", "--no-audit", "--no-fund", "--ignore-scripts"]
+        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=300)
+        if done.returncode:
+            pytest.skip(f"npm cannot install onnxruntime-web here: {done.stderr.strip()[-200:]}")
+    return folder
+
+
+def expected(folder, sound):
+    """[T, C] the deterministic part, by the runtime."""
+    from facesynth.speech.audio import load_audio
+
+    audio, _ = load_audio(sound)
+    stream = load(folder).stream(noise=0.0)
+    return np.concatenate([stream.push(audio), stream.finish()])
+
+
+@pytest.mark.slow
+def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
+    from facesynth.export.models import export_model
+
+    model, sound = talking_head
+    export_model(model, tmp_path / "lds")
+    command = ["node", "speak.mjs", str(tmp_path / "lds"), str(sound)]
+    done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=120)
+    said = json.loads(done.stdout)
+    frames = np.array(said["frames"]).reshape(said["count"], said["channels"])
+    assert said["fps"] == FPS
+    assert np.abs(frames - expected(tmp_path / "lds", sound)).max() < 1e-2  # mm
+
+
+class Site(http.server.SimpleHTTPRequestHandler):
+    """Serves the page and takes its report."""
+
+    def log_message(self, *_):
+        pass
+
+    def do_POST(self):
+        self.server.report = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.send_response(204)
+        self.end_headers()
+        self.server.reported.set()
+
+
+@pytest.mark.slow
+def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
+    model, sound = talking_head
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip("no Chromium is installed (apt-get install chromium)")
+    example = installed("browser")
+    here = tmp_path / "page"
+    shutil.copytree(example, here, ignore=shutil.ignore_patterns("site", "node_modules"))
+    (here / "node_modules").symlink_to(example / "node_modules")
+    subprocess.run([sys.executable, "make_site.py", str(model), str(sound)], cwd=here, check=True, timeout=180)
+    subprocess.run(["node", "build.mjs"], cwd=here, check=True, timeout=60)
+    report = visited(browser, here / "site", tmp_path)
+    assert "error" not in report, report
+    frames = np.array(report["frames"]).reshape(report["count"], report["channels"])
+    assert np.abs(frames - expected(here / "site" / "model", sound)).max() < 1e-2  # mm
+    picture = base64.b64decode(report["picture"].partition(",")[2])
+    (tmp_path / "page.png").write_bytes(picture)
+    assert colours(tmp_path / "page.png") > 100  # a shaded head, no empty canvas
+
+
+def visited(browser, site, scratch):
+    """What the page reports. Every other host than this machine is unknown to the browser."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Site, directory=str(site)))
+    server.reported, server.report = threading.Event(), {"error": f"no report within {WAIT_S} s"}
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    command = [browser, "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={scratch / 'profile'}"]
+    command += ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-background-networking"]
+    command += ["--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1", f"http://127.0.0.1:{server.server_port}/index.html"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(command, start_new_session=True, **quiet)
+    try:
+        server.reported.wait(WAIT_S)
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        server.shutdown()
+        server.server_close()
+    return server.report
+
+
+def colours(path):
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        return len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0))
