@@ -116,6 +116,11 @@ def test_the_prediction_repeats_by_seed_and_leaves_torch_alone(halves, monkeypat
 def test_sharpening_adds_motion_and_leaves_a_held_pose(hearing, halves, speech):
     held = np.ones((40, 2))
     np.testing.assert_allclose(sharpen(held, 1.0, 60), held)
+    noise = np.random.default_rng(0).normal(size=(2000, 1))
+    slow = np.sin(np.arange(2000) / 120 * 2 * np.pi * 3)[:, None]
+    assert np.abs(np.diff(sharpen(noise, 1.0, 120), 3, axis=0)).mean() < np.abs(np.diff(noise, 3, axis=0)).mean()
+    assert np.ptp(sharpen(slow, 1.0, 120)[200:-200]) > 1.4 * np.ptp(slow)
+    np.testing.assert_array_equal(sharpen(noise, 0.0, 120), noise)
     utterance = next(iter(halves[1]))
     energies = [energy_ratio(hearing.with_weights(sharpening=s).synthesize(speech), utterance.motion) for s in (0.0, 0.5, 1.0)]
     assert energies[0] < energies[1] < energies[2]

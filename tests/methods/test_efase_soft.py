@@ -230,7 +230,7 @@ def test_hard_constraints_stay_hard(cold, halves):
     np.testing.assert_array_equal(plan.mixtures[place].nodes, [7])
 
 
-@pytest.mark.parametrize("settings", [{"temperature": -1}, {"candidates": 0}])
+@pytest.mark.parametrize("settings", [{"temperature": -1}, {"candidates": 0}, {"sharpening": -0.1}, {"pose_weight": -1}])
 def test_settings_without_meaning(settings):
     with pytest.raises(FacesynthError, match="at least"):
         Efase(**settings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,8 @@ def _constraint(path: str | Path, place: str, row: Mapping[str, str], line: int,
     try:
         value = float(row[place])
         number = int(row["phone_number"])
+        if not isfinite(value):
+            raise ValueError(value)
     except (TypeError, ValueError):
         raise FacesynthError(f"{path}, line {line}: {place} and phone_number must be numbers; got {dict(row)}") from None
     if place == "time_s":

@@ -30,6 +30,8 @@ class Database:
     """[E, D] mean pose of silence in each emotion."""
     unusable: int
     """Phones that are no nodes because of missing markers, no frames, or a removal."""
+    barren: tuple[str, ...]
+    """Utterances of which nothing could be used."""
 
 
 def build_database(corpus: Corpus, fps: float, components: float) -> Database:
@@ -59,12 +61,13 @@ class _Collector:
         self.before: list[int] = []
         self.silence: dict[str, list[Floats]] = {emotion: [] for emotion in corpus.emotions}
         self.unusable = 0
+        self.barren: list[str] = []
 
     def add(self, utterance: Utterance, motion: Motion) -> None:
         """All phones of one utterance."""
         speech = utterance.speech
         emotions, _ = speech.emotions.per_phone(speech.phones)
-        previous = -1
+        previous, before = -1, len(self.pieces)
         for number, (phone, emotion, piece) in enumerate(self._cut(utterance, motion, emotions)):
             complete = len(piece) > 0 and bool(np.isfinite(piece).all())
             name = node_name(utterance.id, number)
@@ -77,6 +80,8 @@ class _Collector:
             else:
                 self.unusable += 1
             previous = -1
+        if len(self.pieces) == before:
+            self.barren.append(utterance.id)
 
     def add_drawn(self) -> None:
         """Nodes that a person drew; they have no neighbours."""
@@ -97,7 +102,7 @@ class _Collector:
             np.array([index[e] for e in self.emotions]),
             np.array(self.before),
         )
-        return Database(self.pca, nodes, tuple(self.names), self._rest(nodes), self.unusable)
+        return Database(self.pca, nodes, tuple(self.names), self._rest(nodes), self.unusable, tuple(self.barren))
 
     def _cut(self, utterance: Utterance, motion: Motion, emotions: tuple[str, ...]) -> Iterator[tuple[str, str, Floats]]:
         coordinates = self._encode(motion)

@@ -91,8 +91,12 @@ class Efase(Method):
         sharpening: float = 0.0,
     ) -> None:
         super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
-        if temperature < 0 or candidates < 1:
-            raise FacesynthError(f"temperature must be at least 0 and candidates at least 1; got {temperature:g}, {candidates}")
+        lowest = min(temperature, audio_weight, pose_weight, sharpening)
+        if lowest < 0 or candidates < 1:
+            raise FacesynthError(
+                "temperature, audio_weight, pose_weight and sharpening must be at least 0, candidates at least 1; "
+                f"got {lowest:g} and {candidates}"
+            )
         self.smoothing = Smoothing(smoothing_firm, smoothing_loose, smoothing_s, smoothing_stiffness)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0)
@@ -106,7 +110,7 @@ class Efase(Method):
         database = build_database(corpus, self.config["database_fps"], self.config["components"])
         nodes = database.nodes
         self.pca = database.pca
-        self.facts = {"names": list(database.names), "unusable_phones": database.unusable}
+        self.facts = {"names": list(database.names), "unusable_phones": database.unusable, "barren": list(database.barren)}
         self.register_buffer("node_frames", torch.from_numpy(nodes.frames.astype(np.float32)))
         self.register_buffer("node_table", torch.from_numpy(np.stack([getattr(nodes, f) for f in NODE_FIELDS])))
         self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
@@ -119,9 +123,16 @@ class Efase(Method):
     def load(cls, path: Any) -> Self:
         """See `Method.load`."""
         method = super().load(path)
-        count = method.node_table.shape[1] if hasattr(method, "node_table") else -1
-        if count != len(method.facts.get("names", [])):
-            raise FacesynthError(f"{path} lists {len(method.facts.get('names', []))} nodes but holds {count}; train it again")
+        wanted = ("node_frames", "node_table", "rest", "nearest", *(f"forest_{field}" for field in FOREST_FIELDS))
+        if missing := [name for name in wanted if not hasattr(method, name)]:
+            raise FacesynthError(f"{path} is damaged: it holds no {', '.join(missing)}; train it again")
+        count, listed = method.node_table.shape[-1], len(method.facts.get("names", []))
+        if count != listed or count != len(method.nearest):
+            raise FacesynthError(f"{path} lists {listed} nodes but holds {count}; train it again")
+        if int(method.node_table[NODE_FIELDS.index("stops")].max()) > len(method.node_frames):
+            raise FacesynthError(
+                f"{path} is damaged: it holds {len(method.node_frames)} frames, fewer than its nodes; train it again"
+            )
         return method
 
     def weights(self) -> Weights:
@@ -215,9 +226,9 @@ class Efase(Method):
         plan = self.plan(speech, constraints=constraints)
         return explain(self.nodes(), self.facts["names"], self.emotions, plan.query, plan.nodes, self.weights())
 
-    def report(self, speech: Speech) -> dict[str, float]:
+    def report(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> dict[str, float]:
         """Shares of phones said by another phone, viseme class or emotion."""
-        plan = self.plan(speech)
+        plan = self.plan(speech, constraints=constraints)
         return shares(self.nodes(), plan.query, plan.nodes)
 
     def joins(self, speech: Speech) -> np.ndarray:
@@ -307,9 +318,7 @@ class Efase(Method):
         coordinates = concatenate(
             self.nodes(), plan.nodes, labels, bounds, rest, fps, self.smoothing, plan.mixtures, plan.expected
         )
-        if self.config["sharpening"] > 0:
-            coordinates = sharpen(coordinates, self.config["sharpening"], fps)
-        return decode(self.pca, coordinates)
+        return decode(self.pca, sharpen(coordinates, self.config["sharpening"], fps))
 
 
 def decode(pca: Pca, coordinates: Floats) -> Floats:

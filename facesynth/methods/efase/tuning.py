@@ -76,15 +76,15 @@ def split_for_tuning(corpus: Corpus, tuning: int, test: int, seed: int) -> tuple
     for place, count in enumerate((tuning, test)):
         for number in range(count):
             emotion = corpus.emotions[number % len(corpus.emotions)]
-            record = next((r for r in _in_order(corpus, order) if r.emotion == emotion and r.sentence not in taken), None)
-            record = record or next((r for r in _in_order(corpus, order) if r.sentence not in taken), None)
+            fresh = [r for r in _in_order(corpus, order) if r.sentence_key not in taken]
+            record = next((r for r in fresh if r.emotion == emotion), None) or next(iter(fresh), None)
             if record is None:
                 raise FacesynthError(
                     f"{tuning} + {test} sentences were asked for; the corpus has only {len(taken)} different ones"
                 )
-            taken.add(record.sentence)
+            taken.add(record.sentence_key)
             chosen[place].append(record.id)
-    rest = [r.id for r in corpus.usable_records if r.sentence not in taken]
+    rest = [r.id for r in corpus.usable_records if r.sentence_key not in taken]
     return corpus.subset(rest), corpus.subset(chosen[0]), corpus.subset(chosen[1])
 
 
@@ -158,10 +158,14 @@ class _Journal:
     def __init__(self, path: Path, about: dict[str, Any]) -> None:
         self.path, self.errors = path, dict[str, float]()
         if path.exists():
-            lines = path.read_text(encoding="utf-8").splitlines()
-            if not lines or json.loads(lines[0]) != about:
-                raise FacesynthError(f"{path} belongs to another search; give another file, or remove it")
-            self.errors = {row["key"]: row["error"] for row in map(_complete, lines[1:]) if row}
+            text = path.read_text(encoding="utf-8", errors="replace")
+            lines = text.splitlines()
+            if not lines or _complete(lines[0]) != about:
+                raise FacesynthError(f"{path} belongs to another search, or to none; give another file, or remove it")
+            self.errors = {row["key"]: row["error"] for row in map(_complete, lines[1:]) if {"key", "error"} <= row.keys()}
+            if not text.endswith("\n"):  # an interruption cut the last line
+                with path.open("a", encoding="utf-8") as file:
+                    file.write("\n")
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(about) + "\n", encoding="utf-8")
@@ -175,9 +179,10 @@ class _Journal:
 def _complete(line: str) -> dict[str, Any]:
     """A line of the journal, or nothing for one that an interruption cut."""
     try:
-        return json.loads(line)
+        row = json.loads(line)
     except ValueError:
         return {}
+    return row if isinstance(row, dict) else {}
 
 
 class _Workers:
