@@ -55,7 +55,8 @@ def speaker_of(corpus: Corpus) -> Speaker:
     chosen = _fitting(shapes, window)
     cuts = [_cut(videos[name], window) for name in track(chosen, "taking pictures")]
     calm = chosen[_calmest([shapes[name].head for name in chosen], cuts)]
-    behind = read_footage(videos[calm]).frames[:BACKGROUND_FRAMES]
+    behind = read_footage(videos[calm]).frames
+    behind = behind[: min(BACKGROUND_FRAMES, max(1, MOST_BYTES // behind[0].nbytes))]
     points, head = _joined([shapes[name] for name in chosen])
     background = shapes[calm].head.at(np.arange(len(behind)))
     return Speaker(

@@ -11,7 +11,8 @@ from scipy.spatial import Delaunay
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.face.texture.warp import EDGE, PiecewiseAffineWarp
+from facesynth.face.texture.filling import EDGE
+from facesynth.face.texture.warp import PiecewiseAffineWarp
 
 EXAMPLE_POINTS = 12
 

@@ -163,3 +163,10 @@ def test_backgrounds_go_to_and_fro():
 def test_shapes_and_backgrounds_must_be_as_many(speaker):
     with pytest.raises(FacesynthError, match="background"):
         list(TexturedFace(speaker).draw(speaker.shapes[:3], np.array([0]), Report()))
+
+
+def test_a_file_that_would_unpack_to_gigabytes_is_refused_unread(tmp_path, monkeypatch):
+    monkeypatch.setattr("facesynth.archive.LARGEST_BYTES", 1000)
+    np.savez_compressed(tmp_path / "big.npz", pictures=np.zeros(5000, np.uint8))
+    with pytest.raises(FacesynthError, match=r"big\.npz would unpack"):
+        Speaker.load(tmp_path / "big.npz")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.capture.points.footage import Footage, read_footage
@@ -77,11 +77,11 @@ def _place(video: Path, reference: Reference) -> Path:
 def _read(kept: Path) -> tuple[Shapes, Following, bool] | None:
     """None where there is nothing, or something damaged."""
     try:
-        with open(kept, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            points, fps = stored["points"].astype(np.float64), float(stored["fps"])
-            head = HeadMaps(stored["linear"].astype(np.float64), stored["shift"].astype(np.float64))
-            lost, median, worst, drifted, resampled = stored["figures"].tolist()
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, zipfile.BadZipFile):
+        stored = read_arrays(kept, ("points", "fps", "linear", "shift", "figures"), "shapes")
+        points, fps = stored["points"].astype(np.float64), float(stored["fps"])
+        head = HeadMaps(stored["linear"].astype(np.float64), stored["shift"].astype(np.float64))
+        lost, median, worst, drifted, resampled = stored["figures"].tolist()
+    except (ValueError, TypeError):  # FacesynthError is one of them
         return None
     if points.ndim != 3 or head.linear.shape != (len(points), 2, 2) or head.shift.shape != (len(points), 2):
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.capture.points.footage import Footage
 from facesynth.capture.points.region import FaceRegion
@@ -95,11 +95,7 @@ class Reference:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read what `save` wrote; FacesynthError for anything else."""
-        try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-                arrays = {field.name: stored[field.name] for field in fields(cls)}
-        except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
-            raise FacesynthError(f"{path} holds no points of a speaker, or is damaged ({error})") from None
+        arrays = read_arrays(path, [field.name for field in fields(cls)], "points of a speaker")
         picture, points, mean = arrays["picture"], arrays["points"], arrays["mean"]
         lower = int(arrays["lower"])
         whole = picture.ndim == 2 and picture.dtype == np.uint8 and points.shape == mean.shape == (len(points), 2)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import ringed_mesh
@@ -77,11 +77,7 @@ class Speaker:
         """Read what `save` wrote; FacesynthError for anything else."""
         if not Path(path).is_file():
             raise FacesynthError(f"{path}: no such file; it is made by `facesynth train` beside a model of followed points")
-        try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-                arrays = {field.name: stored[field.name] for field in fields(cls)}
-        except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
-            raise FacesynthError(f"{path} holds no pictures of a speaker, or is damaged ({error})") from None
+        arrays = read_arrays(path, [field.name for field in fields(cls)], "pictures of a speaker")
         speaker = cls(**{**arrays, "fps": float(arrays["fps"])})
         fault = _fault(speaker)
         if fault:
