@@ -34,6 +34,8 @@ from facesynth.progress import track
 
 PAGE = "index.html"
 MOST_PANELS = 5
+SHOWN_LAST = ("tcn", "ridge", SECOND_TAKE, "phone mean", "mean face")
+"""Rows that are drawn where there is room, in this order: the less they move, the later."""
 SHAPE_FRAMES = 4000
 """Recorded frames from which the shape at rest comes."""
 
@@ -140,7 +142,7 @@ def _phones(result: Evaluation) -> dict[str, Any]:
 
 def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish) -> Iterator[dict[str, str]]:
     labels = [row.label for row in result.comparison.rows]
-    order = sorted(labels, key=lambda label: (label == SECOND_TAKE, label in REFERENCES))
+    order = sorted(labels, key=lambda label: SHOWN_LAST.index(label) if label in SHOWN_LAST else -1)
     worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
     for utterance_id in track(wish.shown or typical(result), "pictures"):
         pairs = {label: pair for label in order if (pair := read_pair(corpus, result.predictions, label, utterance_id))}

@@ -151,14 +151,16 @@ class Comparison:
 
     def _notes(self, chosen: Sequence[Column]) -> list[str]:
         """Reasons for missing figures, one for each, and the ceiling of the emotion classifier."""
-        missing: dict[str, list[str]] = {}
-        for row in self.rows:
-            for column in chosen:
-                score = self.scores[row.label][column.name]
-                if not score.utterances:
+        labels: dict[tuple[str, str], list[str]] = {}
+        for column in chosen:
+            for row in self.rows:
+                if not self.scores[row.label][column.name].utterances:
                     reason = row.reasons.get(column.name, "the method does not report it")
-                    missing.setdefault(f"{column.name}: {reason}", []).append(row.label)
-        notes = [f"— {reason} ({', '.join(labels)})" for reason, labels in missing.items()]
+                    labels.setdefault((column.name, reason), []).append(row.label)
+        figures: dict[tuple[str, str], list[str]] = {}
+        for (name, reason), without in labels.items():
+            figures.setdefault((reason, ", ".join(without)), []).append(name)
+        notes = [f"— {', '.join(names)}: {reason} ({without})" for (reason, without), names in figures.items()]
         if self.recorded_emotions and any(column.name == "emotion_accuracy" for column in chosen):
             recall = short_number(self.recorded_emotions.unweighted_average_recall)
             accuracy = short_number(self.recorded_emotions.accuracy)
