@@ -88,7 +88,7 @@ def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
 
     model, sound = talking_head
     export_model(model, tmp_path / "lds")
-    command = ["node", "speak.mjs", str(tmp_path / "lds"), str(sound)]
+    command = [shutil.which("node"), "speak.mjs", str(tmp_path / "lds"), str(sound)]
     done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=120)
     said = json.loads(done.stdout)
     frames = np.array(said["frames"]).reshape(said["count"], said["channels"])
@@ -120,7 +120,7 @@ def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
     shutil.copytree(example, here, ignore=shutil.ignore_patterns("site", "node_modules"))
     (here / "node_modules").symlink_to(example / "node_modules")
     subprocess.run([sys.executable, "make_site.py", str(model), str(sound)], cwd=here, check=True, timeout=180)
-    subprocess.run(["node", "build.mjs"], cwd=here, check=True, timeout=60)
+    subprocess.run([shutil.which("node"), "build.mjs"], cwd=here, check=True, timeout=60)
     report = visited(browser, here / "site", tmp_path)
     assert "error" not in report, report
     frames = np.array(report["frames"]).reshape(report["count"], report["channels"])

@@ -135,3 +135,24 @@ def test_threads_are_at_least_one(folders):
 
     with pytest.raises(RuntimeInputError, match="threads is 0"):
         load(folders[0], threads=0)
+
+
+def test_calls_are_those_of_the_torch_models(folders):
+    import inspect
+
+    from facesynth_runtime import load
+
+    from facesynth.methods.emotion.detector import EmotionDetector
+    from facesynth.methods.registry import method_class
+
+    def asked(function):
+        return {
+            n: p.default for n, p in inspect.signature(function).parameters.items() if n != "self" and p.kind != p.VAR_KEYWORD
+        }
+
+    for folder in folders[:3]:
+        runtime = load(folder)
+        wanted, got = asked(method_class(runtime.manifest["method"]).synthesize), asked(runtime.synthesize)
+        assert wanted.items() <= got.items()
+    for name in ("detect", "detect_track", "features"):
+        assert list(asked(getattr(EmotionDetector, name))) == list(asked(getattr(load(folders[3]), name)))

@@ -23,6 +23,8 @@ class Graph:
         self.outputs = [port["name"] for port in entry["outputs"]]
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads, options.log_severity_level = threads, 1, 3
+        # Waiting threads sleep: the processor is seldom ours alone.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         try:
             self._session = onnxruntime.InferenceSession(
                 folder.bytes_of(entry["file"]), options, providers=["CPUExecutionProvider"]

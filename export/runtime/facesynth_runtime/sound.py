@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import gcd
 from typing import Any
 
@@ -23,26 +24,29 @@ def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float3
         return np.asarray(audio, np.float32)
     common = gcd(int(rate), int(new_rate))
     up, down = int(new_rate) // common, int(rate) // common
-    taps, reach = _low_pass(up, down)
+    table, reach = _phases(up, down)
+    each = table.shape[1]
     count = -(-len(audio) * up // down)
-    each = 2 * (reach // up) + 3  # input samples that one output sample may see
     padded = np.pad(np.asarray(audio, np.float64), (each, each))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, each)
     out = np.empty(count, np.float32)
     for start in range(0, count, BLOCK):
         k = np.arange(start, min(start + BLOCK, count), dtype=np.int64)
         first = -(-(k * down - reach) // up)
-        inputs = first[:, None] + np.arange(each)
-        places = reach + k[:, None] * down - inputs * up
-        weights = np.where((places >= 0) & (places < len(taps)), taps[np.clip(places, 0, len(taps) - 1)], 0.0)
-        inside = np.clip(inputs + each, 0, len(padded) - 1)
-        out[k] = (weights * padded[inside]).sum(axis=1)
+        phase = first * up - (k * down - reach)
+        out[k] = np.einsum("kn,kn->k", table[phase], windows[np.minimum(first + each, len(windows) - 1)])
     return out
 
 
-def _low_pass(up: int, down: int) -> tuple[NDArray[np.float64], int]:
-    """A Kaiser-windowed sinc of gain `up`, and its half length."""
+@lru_cache(maxsize=8)
+def _phases(up: int, down: int) -> tuple[NDArray[np.float64], int]:
+    """[up, n] taps that the n input samples around an output sample are weighted with, by where it lies between them.
+
+    Taken from a Kaiser-windowed sinc of gain `up`, whose half length, counted at the common rate, comes beside them.
+    """
     slower = max(up, down)
     reach = 10 * slower
-    at = np.arange(-reach, reach + 1)
-    taps = np.sinc(at / slower) * np.kaiser(2 * reach + 1, KAISER_BETA)
-    return taps * (up / taps.sum()), reach
+    taps = np.sinc(np.arange(-reach, reach + 1) / slower) * np.kaiser(2 * reach + 1, KAISER_BETA)
+    taps *= up / taps.sum()
+    places = 2 * reach - np.arange(up)[:, None] - up * np.arange(2 * reach // up + 2)
+    return np.where(places >= 0, taps[np.maximum(places, 0)], 0.0), reach
