@@ -27,6 +27,8 @@ MOST_BYTES = 300_000_000
 """Of all cut-out pictures together: three minutes of a face 130 pixels wide, some hundred pictures in full HD."""
 BACKGROUND_FRAMES = 250
 SHORT_FRAMES = 25
+OTHER_LIGHT = 15.0
+"""Distance (0..255) of the mean colours of the lower face: clips further from the background's show up as seams over it."""
 SUFFIX = ".face.npz"
 
 
@@ -45,7 +47,10 @@ def save_face(corpus: Corpus, model: Path) -> Path | None:
 
 
 def speaker_of(corpus: Corpus) -> Speaker:
-    """The pictures of a corpus, clips taken evenly as far as they fit, and a calm clip as what they are laid over."""
+    """The pictures of a corpus, clips taken evenly as far as they fit, and a calm clip as what they are laid over.
+
+    Clips in another light, or of another white balance, give no pictures; the model learns from their shapes all the same.
+    """
     videos = kept_videos(corpus)
     if not videos:
         raise FacesynthError(f"{corpus.path} keeps no video of its utterances; add the videos again with `corpus add --points`")
@@ -54,7 +59,11 @@ def speaker_of(corpus: Corpus) -> Speaker:
     window = lower_face_window(*_joined(list(shapes.values())), height, width)
     chosen = _fitting(shapes, window)
     cuts = [_cut(videos[name], window) for name in track(chosen, "taking pictures")]
-    calm = chosen[_calmest([shapes[name].head for name in chosen], cuts)]
+    colours = np.array([cut[:, ::4, ::4].mean(axis=(0, 1, 2)) for cut in cuts])
+    calm = chosen[_calmest([shapes[name].head for name in chosen], colours)]
+    alike = np.linalg.norm(colours - colours[chosen.index(calm)], axis=1) <= OTHER_LIGHT
+    chosen = [name for name, kept in zip(chosen, alike, strict=True) if kept]
+    cuts = [cut for cut, kept in zip(cuts, alike, strict=True) if kept]
     behind = read_footage(videos[calm]).frames
     behind = behind[: min(BACKGROUND_FRAMES, max(1, MOST_BYTES // behind[0].nbytes))]
     points, head = _joined([shapes[name] for name in chosen])
@@ -103,15 +112,14 @@ def likeness(motion: Motion, speaker: Speaker, report: Report, choice: Choice = 
         yield picture[:height, :width]
 
 
-def _calmest(heads: list[HeadMaps], cuts: list[NDArray[np.uint8]]) -> int:
+def _calmest(heads: list[HeadMaps], colours: NDArray[np.float64]) -> int:
     """The clip in which the head wanders least, of the half that is lit and coloured most like all of them together.
 
     Very short clips, which would repeat themselves to be seen, come last.
     """
-    colours = np.array([cut[:, ::4, ::4].mean(axis=(0, 1, 2)) for cut in cuts])
     odd = np.linalg.norm(colours - np.median(colours, axis=0), axis=1)
     wandering = np.array([np.ptp(head.shift, axis=0).sum() for head in heads])
-    short = np.array([len(cut) < SHORT_FRAMES for cut in cuts])
+    short = np.array([len(head.shift) < SHORT_FRAMES for head in heads])
     return int(np.lexsort((wandering, odd > np.median(odd), short))[0])
 
 

@@ -16,7 +16,7 @@ from facesynth.corpus.importers.points import kept_videos, shapes_beside
 from facesynth.errors import FacesynthError
 from facesynth.face.texture.speaker import Speaker
 from facesynth.face.video import read_video, write_video
-from facesynth.likeness import face_path
+from facesynth.likeness import face_path, speaker_of
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import save_wav
 
@@ -213,6 +213,18 @@ def test_options_that_do_nothing_are_named(studio, tmp_path):
     result = CliRunner().invoke(speak, list(map(str, [*arguments, "--pictures", "nearest"])))
     assert "warning: --fps: a real face keeps the rate" in result.stderr
     assert float(read_video(tmp_path / "out.mp4").fps) == FPS
+
+
+def test_clips_in_another_light_give_no_pictures(studio, tmp_path, monkeypatch):
+    monkeypatch.setenv("FACESYNTH_CACHE", str(tmp_path / "cache"))
+    texture = skin(0)
+    for seed in range(4):
+        film(tmp_path / f"c{seed}.mp4", seed, texture if seed else 0.7 * texture)
+    clips = sorted(tmp_path.glob("c*.*"))
+    run(corpus_group, "add", tmp_path / "actor", *clips, "--points", "--box", PLACE, "--jobs", 1)
+    speaker = speaker_of(Corpus.open(tmp_path / "actor"))
+    assert len(speaker.pictures) == 3 * FRAMES
+    assert speaker.clip_starts.sum() == 3
 
 
 def test_silence_is_one_clear_line(studio, tmp_path):

@@ -20,8 +20,7 @@ from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
 from facesynth.motion.planar import HeadMaps
 
 BATCH = 4
-LARGEST_GAIN = 2.0
-"""Of one channel: cameras set their white anew from clip to clip."""
+LARGEST_GAIN = 1.3
 
 Choice = Literal["coherent", "nearest"]
 
