@@ -33,7 +33,8 @@ def main() -> None:
     phones = read_phones(options.phones, len(audio) / rate)
     print(f"{phones.duration_s:.2f} s of speech, {len(phones)} phones")
     print(
-        "| folder | method | MB | start, s | real-time factor, 1 thread | 2 threads | streaming |\n|---|---|---:|---:|---:|---:|---|"
+        "| folder | method | MB | start, s | real-time factor, 1 thread | 2 threads | streaming |\n"
+        "|---|---|---:|---:|---:|---:|---|"
     )
     for folder in options.folders:
         row(folder, audio, rate, phones)

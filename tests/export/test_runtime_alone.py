@@ -156,3 +156,11 @@ def test_calls_are_those_of_the_torch_models(folders):
         assert wanted.items() <= got.items()
     for name in ("detect", "detect_track", "features"):
         assert list(asked(getattr(EmotionDetector, name))) == list(asked(getattr(load(folders[3]), name)))
+
+
+def test_both_distributions_have_one_version():
+    import facesynth_runtime
+
+    import facesynth
+
+    assert facesynth_runtime.__version__ == facesynth.__version__
