@@ -2,6 +2,7 @@
 
     python benchmarks/efase_search.py [--corpus FOLDER]
 
+The weights are those that `Efase` has by default; `--published` takes those of Deng 2006.
 Without a corpus the database is generated: English phone sequences (words of CMUdict at random),
 each phone a target in 25 dimensions with falling variance, co-articulated by a Gaussian window and
 varied from node to node. Seed and PNT are printed. Times are ratios against the dense search in the same run.
@@ -9,6 +10,8 @@ varied from node to node. Seed and PNT are printed. Times are ratios against the
 
 import argparse
 import time
+import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -20,6 +23,7 @@ from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.search import build_index, search
 
+SEED = 0
 SIZES = (2000, 4000, 8000, 16000, 32000)
 PAPER_2008_S = {14: 221, 24: 333, 53: 816, 63: 943}
 PAPER_2006_S = {14: 137.67, 24: 192.86, 33: 371.50, 63: 518.34}
@@ -39,7 +43,7 @@ def english_phones(rng, count):
     return phones, np.array([viseme_of(label) for label in labels[:count]])
 
 
-def generated_nodes(count, seed=0, width=25, emotions=4, sentence=30):
+def generated_nodes(count, seed=SEED, width=25, emotions=4, sentence=30):
     rng = np.random.default_rng(seed)
     phones, visemes = english_phones(rng, count)
     emotion = rng.integers(0, emotions, -(-count // sentence)).repeat(sentence)[:count]
@@ -54,7 +58,7 @@ def generated_nodes(count, seed=0, width=25, emotions=4, sentence=30):
     return MotionNodes.from_pieces(pieces, phones, visemes, emotion, before)
 
 
-def generated_query(nodes, count, seed=1):
+def generated_query(nodes, count, seed=SEED + 1):
     rng = np.random.default_rng(seed)
     phones, visemes = english_phones(rng, count)
     return Query(phones, visemes, np.full(count, rng.integers(nodes.emotions.max() + 1)), {})
@@ -68,13 +72,20 @@ def corpus_nodes(folder):
     return model.nodes()
 
 
-def subsample(nodes, count, seed=0):
+def subsample(nodes, count, seed=SEED):
     """Whole runs of neighbours, until `count` nodes are there."""
     starts = np.flatnonzero(nodes.before < 0)
     runs = np.split(np.arange(len(nodes)), starts[1:])
     order = np.random.default_rng(seed).permutation(len(runs))
     keep = np.concatenate([runs[r] for r in order])[:count]
     return nodes.take(np.sort(keep))
+
+
+def weights_for(nodes, penalty, published):
+    from facesynth.methods.efase.method import Efase
+
+    unit = Weights(1.0) if published else replace(Efase().weights(), pnt=1.0)
+    return replace(unit, pnt=penalty * median_transition(nodes, unit))
 
 
 def timed(what, repeats=3):
@@ -94,6 +105,11 @@ def against_dense(nodes, query, weights):
     prepared_s, _ = timed(lambda: search(index, query))
     print(f"N = {len(nodes)}, T = {len(query)}, PNT = {weights.pnt:.4g}; share of phi computed {found.evaluated:.2%}")
     print(f"  dense: transition matrix {matrix_s:.2f} s + blocked min-plus {dense_s:.2f} s")
+    tracemalloc.start()
+    search(build_index(nodes, weights), query)
+    peak_mb = tracemalloc.get_traced_memory()[1] / 1e6
+    tracemalloc.stop()
+    print(f"  most memory of (a): {peak_mb:.0f} MB; of the N x N matrix alone {len(nodes) ** 2 * 4 / 1e6:.0f} MB")
     print(f"  (a) from nothing {from_nothing_s:.3f} s: {(matrix_s + dense_s) / from_nothing_s:.1f} x faster")
     print(
         f"  (b) tables kept, {index.bytes / 1e6:.1f} MB, {prepared_s:.3f} s: "
@@ -106,14 +122,14 @@ def against_dense(nodes, query, weights):
             print(f"  the {year} paper on its machine, 5,556 nodes: {seconds[len(query)]} s")
 
 
-def growth(nodes_of, query_of, penalty):
+def growth(nodes_of, query_of, penalty, published):
     seconds = []
     sizes = []
     for size in SIZES:
         nodes = nodes_of(size)
         if sizes and len(nodes) < 1.5 * sizes[-1]:
             break
-        weights = Weights(penalty * median_transition(nodes, Weights(1.0)))
+        weights = weights_for(nodes, penalty, published)
         query = query_of(nodes)
         best, found = timed(lambda n=nodes, w=weights, q=query: search(build_index(n, w), q))
         print(f"  N = {len(nodes):6d}: {best:.3f} s, phi computed {found.evaluated:.2%}", flush=True)
@@ -129,8 +145,10 @@ def main():
     parser.add_argument("--corpus", help="folder of a corpus to take the nodes from")
     parser.add_argument("--phones", type=int, default=63)
     parser.add_argument("--penalty", type=float, nargs="+", default=[10.0], help="PNT over the median rule-2 cost")
+    parser.add_argument("--published", action="store_true", help="weights of Deng 2006")
     options = parser.parse_args()
-    torch.manual_seed(0)
+    torch.manual_seed(SEED)
+    print(f"seed {SEED}; nodes {f'of {options.corpus}' if options.corpus else 'generated'}; phone sequences generated")
     everything = corpus_nodes(options.corpus) if options.corpus else None
 
     def nodes_of(size):
@@ -142,10 +160,10 @@ def main():
     search(build_index(generated_nodes(200), Weights(1.0)), generated_query(generated_nodes(200), 5))  # compile
     for penalty in options.penalty:
         nodes = nodes_of(5556)
-        weights = Weights(penalty * median_transition(nodes, Weights(1.0)))
+        weights = weights_for(nodes, penalty, options.published)
         against_dense(nodes, query_of(nodes), weights)
         print(f"growth of (a), PNT = {penalty} x median:")
-        growth(nodes_of, query_of, penalty)
+        growth(nodes_of, query_of, penalty, options.published)
 
 
 if __name__ == "__main__":

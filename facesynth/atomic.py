@@ -14,7 +14,8 @@ def atomic_path(target: str | Path) -> Iterator[Path]:
     """A temporary path beside `target` (same suffix) that replaces it when the block ends well.
 
     When the block raises, KeyboardInterrupt included, the temporary file is removed and `target`
-    is as it was. The temporary name starts with a dot, so that listings of a corpus pass it over.
+    is as it was; an OSError of writing then names `target`. The temporary name starts with a dot, so that
+    listings of a corpus pass it over.
     """
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -25,6 +26,10 @@ def atomic_path(target: str | Path) -> Iterator[Path]:
         yield part
         os.chmod(part, 0o666 & ~_umask())
         os.replace(part, target)
+    except OSError as error:
+        if error.filename not in (None, "", name):
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(target)) from error
     finally:
         part.unlink(missing_ok=True)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 
 import click
@@ -53,6 +54,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line: 0 when all is well, 2 with one line for wrong input, 1 with a traceback for a bug."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # being ended leaves no more behind than Ctrl-C does
     try:
         cli.main(standalone_mode=False)
     except FacesynthError as error:

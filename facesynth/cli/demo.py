@@ -43,7 +43,7 @@ class Clock:
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), default=Path("facesynth-demo"), show_default=True
 )
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--size", default="1280x720", show_default=True, help="Of the video.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def demo(output: Path, seed: int, size: str, as_json: bool) -> None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @click.option("--workers", default=1, show_default=True, help="Processes at once; each keeps to one thread.")
 @click.option("--engine", default="processes", show_default=True, help="processes, or ray.")
 @click.option("--address", default="", help="Of a Ray cluster whose machines see the same files.")
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
     *,

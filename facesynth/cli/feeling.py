@@ -116,9 +116,12 @@ def _graph(method: Method, maps: Path | None) -> AnimeGraph:
 
 
 def account(method: Method, speech: Speech, settings: dict[str, Any]) -> dict[str, Any]:
-    """What the search of an anime graph found, for JSON; what the graph lacked, and what looking ahead lost, is said."""
+    """What the search found, for JSON: eFASE's shares of wrong nodes; what an anime graph lacked or lost is also said."""
     from facesynth.methods.anime_graph.method import AnimeGraph
+    from facesynth.methods.efase.method import Efase
 
+    if isinstance(method, Efase):
+        return {"search": method.report(speech, **settings)}
     if not isinstance(method, AnimeGraph):
         return {}
     found = method.plan(speech, **settings).summary()

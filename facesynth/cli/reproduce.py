@@ -15,7 +15,7 @@ import click
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="A .md, .csv or .json file to write as well.")
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes.")
 @click.option("--test-limit", type=click.IntRange(min=2), default=24, show_default=True, help="Utterances tested.")
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def reproduce(
     *,

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.feeling import account, asks_to_listen, feeling_options, mapping, spoken_feeling
+from facesynth.cli.feeling import AUTO, account, asks_to_listen, feeling_options, mapping, spoken_feeling
 from facesynth.cli.own_rig import as_arkit, own_head, own_rig_options
 from facesynth.cli.recordings import recordings
-from facesynth.errors import FacesynthError
+from facesynth.cli.targets import plan_targets, write_phones
+from facesynth.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
     from facesynth.methods.anime_graph.method import AnimeGraph
@@ -35,7 +36,7 @@ class Gain(click.ParamType):
             gain = 0.0 if value == "off" else float(value)
         except ValueError:
             gain = -1.0
-        if gain < 0:
+        if not 0 <= gain < float("inf"):
             self.fail(f"wanted off or a factor such as 0.5; got {value!r}", param, ctx)
         return gain
 
@@ -106,7 +107,7 @@ class Fps(click.ParamType):
     show_default=True,
     help="Real face: recorded pictures that follow each other well, or simply the nearest.",
 )
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Turn SPEECH, files or folders of them, into a talking face.
@@ -120,56 +121,83 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
     paths = recordings(speech)
     if len(paths) > 1:
         _require_batch(outputs, options)
+    plan = plan_targets(paths, outputs, [path for path in speech if path.is_dir()])
     size = parse_size(options["size"])
     method = load(model)
+    _check_feeling(method, options)
     options["face_of"] = model
-    results = [_speak_one(method, path, outputs, size, options) for path in paths]
+    if len(paths) == 1:
+        result = _speak_one(method, paths[0], plan[paths[0]], size, options)
+        click.echo(json.dumps(result) if as_json else "", nl=as_json)
+        return
+    _speak_all(method, plan, size, options, as_json)
+
+
+def _speak_all(
+    method: Method, plan: dict[Path, list[Path]], size: tuple[int, int], options: dict[str, Any], as_json: bool
+) -> None:
+    """One after the other; what fails is told and passed over, and the command ends in an error after the last."""
+    results, failed = [], []
+    for path, targets in plan.items():
+        try:
+            results.append(_speak_one(method, path, targets, size, options))
+        except FacesynthError as error:
+            click.echo(f"error: {error}", err=True)
+            failed.append(path.name)
     if as_json:
-        click.echo(json.dumps(results if len(results) > 1 else results[0]))
+        click.echo(json.dumps(results))
+    if failed:
+        raise FacesynthError(f"{len(failed)} of {len(plan)} recordings were not spoken: {', '.join(failed)}")
 
 
-def _speak_one(method: Method, path: Path, outputs: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
+def _check_feeling(method: Method, options: dict[str, Any]) -> None:
+    if options["emotions"] and options["emotion"]:
+        raise FacesynthError("both --emotion and --emotions were given; give one")
+    if options["emotions"] and str(options["emotions"]) != AUTO and options["intensity"] != 1:
+        raise FacesynthError("--intensity weakens --emotion; in --emotions each line has an intensity of its own")
+    if options["emotion"] not in (None, AUTO, *method.emotions):
+        raise unknown("emotion", options["emotion"], method.emotions)
+
+
+def _speak_one(method: Method, path: Path, targets: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
     from facesynth.atomic import write_text
     from facesynth.face.rig import load_head
     from facesynth.motion.planar import is_tracked
     from facesynth.speaking import Stage, perform, write_performance
-    from facesynth.speech.textgrid import write_textgrid
 
     heard = _hear(path, method, options)
     for warning in heard.warnings:
         click.echo(f"warning: {path.name}: {warning}", err=True)
     settings = _method_options(method, heard, options)
     if is_tracked(method.fitted_layout):
-        return _show_likeness(method, heard, path, outputs, settings, options)
+        return _show_likeness(method, heard, path, targets, settings, options)
     rig = load_head()
     stage = Stage(float(options["fps"]), options["head"], options["eyes"], options["seed"], options["deform"])
     own = own_head(options)
     change = as_arkit(method, own, options, mapping(method, heard.speech, options))
     performance = perform(method, heard.speech, rig, stage, settings, change)
     found = account(method, heard.speech, settings)
-    targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
-    for target in targets:
-        write_performance(target, performance, rig, size, own)
-        click.echo(f"{target}: {heard.speech.duration_s:.2f} s at {float(options['fps']):.5g} fps", err=True)
-    written = [str(target) for target in targets]
-    if heard.source in ("transcript", "recognition"):
-        grid = targets[0].with_suffix(".TextGrid")
-        write_textgrid(grid, heard.speech.phones, heard.words)
-        written.append(str(grid))
+    written = []
     if options["explain"]:
         write_text(options["explain"], json.dumps(_explaining(method).explain(heard.speech, **settings), indent=1))
         written.append(str(options["explain"]))
+    for target in targets:
+        write_performance(target, performance, rig, size, own)
+        click.echo(f"{target}: {heard.speech.duration_s:.2f} s at {float(options['fps']):.5g} fps", err=True)
+    written += [str(target) for target in targets]
+    grid = targets[0].with_suffix(".TextGrid")
+    if heard.source in ("transcript", "recognition") and write_phones(grid, heard):
+        written.append(str(grid))
     return {"speech": str(path), "duration_s": heard.speech.duration_s, "phones": heard.source, "written": written, **found}
 
 
 def _show_likeness(
-    method: Method, heard: Heard, path: Path, outputs: list[Path], settings: dict[str, Any], options: dict[str, Any]
+    method: Method, heard: Heard, path: Path, targets: list[Path], settings: dict[str, Any], options: dict[str, Any]
 ) -> dict[str, Any]:
     """The speaker's real face, for a model of points followed in video; at the rate and size of the speaker's pictures."""
     from facesynth.corpus.signals import write_motion
     from facesynth.likeness import load_face, write_likeness
 
-    targets = [Path(str(output).replace("{name}", path.stem)) for output in outputs]
     for target in targets:
         if target.suffix.lower() not in (".mp4", ".npz"):
             raise FacesynthError(
@@ -207,6 +235,13 @@ def _was_given(context: click.Context, name: str) -> bool:
 
 
 def _hear(path: Path, method: Method, options: dict[str, Any]) -> Heard:
+    try:
+        return _heard(path, method, options)
+    except FacesynthError as error:
+        raise error if path.name in str(error) else FacesynthError(f"{path}: {error}") from None
+
+
+def _heard(path: Path, method: Method, options: dict[str, Any]) -> Heard:
     from facesynth.speech.hearing import hear
 
     text, phones = _given_text(options), options["phones"]

@@ -18,7 +18,7 @@ import click
 @click.option(
     "--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Which sentences to learn from."
 )
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def train(
     *,
@@ -59,6 +59,12 @@ def train(
     face = save_face(recordings, path)
     size_mb = path.stat().st_size / 1e6
     facts = {"model": str(path), "method": method, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
+    if (unusable := model.facts.get("unusable_phones", 0)) > 0:
+        facts["unusable_phones"] = unusable
+        click.echo(f"warning: {unusable} recorded phones were left out: their motion has gaps, or they were removed", err=True)
+    if barren := model.facts.get("barren"):
+        facts["utterances_left_out"] = barren
+        click.echo(f"warning: nothing of {', '.join(barren)} could be used; `facesynth corpus check` says why", err=True)
     if as_json:
         click.echo(json.dumps({**facts, "synthetic": recordings.synthetic}))
         return

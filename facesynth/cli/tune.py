@@ -17,7 +17,7 @@ import click
 @click.option("--generations", default=10, show_default=True, help="Of 28 evaluations each, after the first.")
 @click.option("--limit", type=click.IntRange(min=2), help="At most so many utterances in the database, evenly chosen.")
 @click.option("--workers", default=2, show_default=True)
-@click.option("--seed", default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def tune(
     *,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Mapping
+from errno import EIO
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, get_type_hints
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -23,6 +24,9 @@ from facesynth.speech.speech import Speech
 
 FORMAT = 1
 """Version of the model file; a file of another version is refused."""
+
+_FITTING: dict[type, tuple[type, ...]] = {float: (float, int), int: (int,), bool: (bool,), str: (str,)}
+_HEADER = ("method", "config", "layout", "fps", "emotions", "facts", "provenance")
 
 
 class Method(nn.Module):
@@ -50,6 +54,10 @@ class Method(nn.Module):
         for key in config:
             if key not in known:
                 raise unknown(f"{cls.name} setting", key, known)
+        hints = get_type_hints(cls.__init__)
+        for key, value in config.items():
+            if (kind := hints.get(key)) in _FITTING and type(value) not in _FITTING[kind]:
+                raise FacesynthError(f"{cls.name} setting {key} must be a {kind.__name__}; got {value!r}")
         return cls(**config)
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
@@ -90,7 +98,10 @@ class Method(nn.Module):
         }
         tensors = {key: value.detach().cpu().contiguous() for key, value in self.state_dict().items()}
         with atomic_path(path) as part:
-            save_file(tensors, part, metadata={"facesynth": json.dumps(header, sort_keys=True)})
+            try:
+                save_file(tensors, part, metadata={"facesynth": json.dumps(header, sort_keys=True)})
+            except SafetensorError as error:  # a full disk, a limit on file sizes
+                raise OSError(EIO, f"the model cannot be written ({error})") from error
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -126,6 +137,8 @@ def read_header(path: str | Path) -> dict[str, Any]:
         raise FacesynthError(f"{path} has a damaged facesynth header; train the model again") from None
     if header.get("format") != FORMAT:
         raise FacesynthError(f"{path} has model format {header.get('format')}; this facesynth reads {FORMAT}: train it again")
+    if missing := [key for key in _HEADER if key not in header]:
+        raise FacesynthError(f"{path} has a damaged facesynth header without {', '.join(missing)}; train the model again")
     return header
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from facesynth.errors import unknown
+from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.method import Method, read_header
 
 _MODULES = {
@@ -55,4 +55,7 @@ def create(name: str, **config: Any) -> Method:
 def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
     header = read_header(path)
-    return method_class(header["method"]).load(path)
+    try:
+        return method_class(header["method"]).load(path)
+    except (KeyError, IndexError, AttributeError, TypeError, RuntimeError) as error:
+        raise FacesynthError(f"{path} is damaged, or another version wrote it ({error!r}); train it again") from error

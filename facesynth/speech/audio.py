@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from errno import EIO
 from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,7 +60,10 @@ def save_wav(path: str | Path, audio: NDArray[np.float32], rate: int) -> None:
     import soundfile
 
     with atomic_path(path) as part:
-        soundfile.write(part, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
+        try:
+            soundfile.write(part, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
+        except soundfile.LibsndfileError as error:  # a full disk, a limit on file sizes
+            raise OSError(EIO, f"the sound cannot be written ({error})") from error
 
 
 def require_sound(audio: NDArray[np.float32], rate: int) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from corpora import tiny_corpus
+from literal_search import literal
 
 from facesynth.config import load_config
 from facesynth.corpus import node_name
@@ -14,7 +15,7 @@ from facesynth.evaluation.emotion_recognition import EmotionRecogniser
 from facesynth.methods.efase.constraints import read_constraints
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.search import search
+from facesynth.methods.efase.search import build_index, search
 from facesynth.methods.registry import create, load
 from facesynth.speech.phones import PHONES
 from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
@@ -232,6 +233,31 @@ def test_dense_search_on_a_torch_device_finds_the_same_path(model, speech):
     assert (query.phones < 0).any()  # silence is a step here
     dense, sparse = dense_search(nodes, query, weights, transitions), search(model.index(), query)
     np.testing.assert_allclose(dense.cost, sparse.cost, rtol=1e-9)
+
+
+def test_equals_the_literal_algorithm_on_a_recorded_database(model, halves):
+    nodes, weights = model.nodes().take(np.arange(90)), model.weights()
+    index = build_index(nodes, weights)
+    for utterance in list(halves[1])[:3]:
+        query = model.plan(utterance.speech).query
+        cost, path = literal(nodes, query, weights)
+        found = search(index, query)
+        np.testing.assert_allclose(found.cost, cost, rtol=1e-9)
+        np.testing.assert_array_equal(found.nodes, path)
+
+
+def test_a_constraint_changes_nothing_beyond_the_next_pause(model, speech):
+    long = repeated(speech, 3)
+    labels = long.phones.labels
+    index = next(i for i, label in enumerate(labels) if label != "pau")
+    free = model.plan(long)
+    name = next(name for n, name in enumerate(model.facts["names"]) if n != free.nodes[index])
+    base, changed = model.synthesize(long), model.synthesize(long, constraints={index: name})
+    pause = next(i for i, label in enumerate(labels) if label == "pau" and i > index)
+    first = int(np.ceil(long.phones.ends_s[pause] * base.fps)) + 1
+    assert first < len(base) / 2
+    np.testing.assert_array_equal(base.frames[first:], changed.frames[first:])
+    assert np.abs(base.frames[:first] - changed.frames[:first]).max() > 1e-3
 
 
 def repeated(speech, count):

@@ -1,5 +1,8 @@
 """eFASE that hears: audio terms, the expected pose, sharpening, and learning through the soft search."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -183,3 +186,15 @@ def test_the_shipped_soft_settings_are_settings_of_efase(repository):
     config = Efase.from_config(load_config(repository / "configs" / "efase_soft.yaml")).config
     assert config["temperature"] > 0
     assert config["pose_weight"] > 0
+
+
+def test_the_training_script_learns_weights(tmp_path, repository):
+    corpus = tiny_corpus(tmp_path / "actor", utterances=40, fps=60)
+    model = tmp_path / "learned.safetensors"
+    command = [sys.executable, str(repository / "train" / "efase.py"), str(corpus.path), "-o", str(model)]
+    command += ["learn=true", "temperature=1", "audio_weight=0.3", "candidates=10"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "validation error" in done.stdout
+    assert "penalty=" in done.stdout
+    assert load(model).config["temperature"] > 0

@@ -2,25 +2,11 @@
 
 import numpy as np
 import pytest
+from literal_search import literal
 
-from facesynth.methods.efase.costs import Query, Weights, path_cost, target_costs, transition_cost
+from facesynth.methods.efase.costs import Query, Weights, path_cost
 from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.search import build_index, search
-
-
-def literal(nodes, query, weights):
-    """Algorithm 1 of Deng 2008 as written."""
-    n, count = len(nodes), len(query)
-    steps = np.array([[transition_cost(nodes, i, j, weights) for j in range(n)] for i in range(n)])
-    phi, back = target_costs(nodes, query, 0, weights), []
-    for t in range(1, count):
-        total = phi[:, None] + steps
-        back.append(total.argmin(axis=0))
-        phi = total.min(axis=0) + target_costs(nodes, query, t, weights)
-    path = [int(phi.argmin())]
-    for choice in reversed(back):
-        path.append(int(choice[path[-1]]))
-    return phi.min(), np.array(path[::-1])
 
 
 def random_nodes(rng, count=40, phones=5, emotions=2, width=3, scale=1.0, sentence=6, shortest=1):

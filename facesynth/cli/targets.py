@@ -1,0 +1,65 @@
+"""Where `speak` writes, and what it must not write over."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import click
+
+from facesynth.errors import FacesynthError
+
+if TYPE_CHECKING:
+    from facesynth.speech.hearing import Heard
+
+NAME = "{name}"
+
+
+def plan_targets(recordings: Sequence[Path], outputs: Sequence[Path], folders: Sequence[Path]) -> dict[Path, list[Path]]:
+    """What is written for each recording.
+
+    Files inside `folders` that are results of other recordings there, from an earlier run, are no recordings. A
+    FacesynthError refuses what would be written over a recording, or twice.
+    """
+    for output in outputs:
+        if odd := [field for field in re.findall(r"\{[^{}]*\}", str(output)) if field != NAME]:
+            raise FacesynthError(f"{output}: {odd[0]} stands for nothing; {NAME} stands for the name of the speech file")
+    plan = {path: [Path(str(output).replace(NAME, path.stem)) for output in outputs] for path in recordings}
+    results = {target.resolve(): path for path, targets in plan.items() for target in targets}
+    for path in recordings:
+        if path.parent in folders and results.get(path.resolve(), path) != path:
+            del plan[path]
+    _check_free(plan)
+    return plan
+
+
+def _check_free(plan: dict[Path, list[Path]]) -> None:
+    sources = {path.resolve() for path in plan}
+    writers: dict[Path, Path] = {}
+    for path, targets in plan.items():
+        for target in targets:
+            if target.resolve() in sources:
+                raise FacesynthError(f"{target} is a recording that is to be spoken; write to another file")
+            if (other := writers.setdefault(target.resolve(), path)) != path:
+                raise FacesynthError(f"{other.name} and {path.name} would both be written to {target}; rename one of them")
+
+
+def write_phones(path: Path, heard: Heard) -> bool:
+    """Write what was heard as a TextGrid; one that is there and differs may have been corrected by hand and stays."""
+    from facesynth.speech.textgrid import write_textgrid
+
+    if path.exists():
+        with TemporaryDirectory() as folder:
+            write_textgrid(Path(folder) / "new.TextGrid", heard.speech.phones, heard.words)
+            if (Path(folder) / "new.TextGrid").read_bytes() == path.read_bytes():
+                return True
+        click.echo(
+            f"warning: {path} was there and differs: it stays as it is; give it with --phones, or remove it for a new one",
+            err=True,
+        )
+        return False
+    write_textgrid(path, heard.speech.phones, heard.words)
+    return True
