@@ -1,5 +1,6 @@
 """eFASE as a method: what it learns, obeys, explains and refuses."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 import torch
 from corpora import tiny_corpus
 from literal_search import literal
+from safetensors import safe_open
+from safetensors.torch import save_file
 
 from facesynth.config import load_config
 from facesynth.corpus import node_name
@@ -307,6 +310,22 @@ def test_model_files_that_are_none(model, tmp_path):
         load(path)
     with pytest.raises(FacesynthError, match="no such model"):
         load(tmp_path / "nothing.safetensors")
+
+
+@pytest.mark.parametrize("spoil", ["config", "node_frames", "nearest", "short"])
+def test_model_files_with_something_missing(model, tmp_path, spoil):
+    path = tmp_path / "m.safetensors"
+    model.save(path)
+    with safe_open(path, "pt") as file:
+        header = json.loads(file.metadata()["facesynth"])
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+    header.pop(spoil, None)
+    tensors.pop(spoil, None)
+    if spoil == "short":
+        tensors["node_frames"] = tensors["node_frames"][:5].contiguous()
+    save_file(tensors, path, metadata={"facesynth": json.dumps(header)})
+    with pytest.raises(FacesynthError, match="damaged"):
+        load(path)
 
 
 def test_licence_and_consent_travel_with_the_model(model, halves, tmp_path):

@@ -1,8 +1,11 @@
 """The search of eFASE's parameters: repeatable, resumable, the same with more processes."""
 
+import csv
+
 import pytest
 from corpora import tiny_corpus
 
+from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.tuning import CROWD, PUBLISHED, RANGES, examples_of, mean_error, split_for_tuning, tune
@@ -52,6 +55,26 @@ def test_an_interrupted_search_goes_on_and_ends_alike_with_more_processes(parts,
 def test_a_journal_of_another_search_is_refused(parts, model, found):
     with pytest.raises(FacesynthError, match="another search"):
         tune(model, parts[1], parts[2], journal=found[1], generations=0, seed=1)
+
+
+@pytest.mark.parametrize("content", ["", "garbage\n", "[1, 2]\n"])
+def test_a_journal_that_is_none_is_refused(parts, model, tmp_path, content):
+    (tmp_path / "j.jsonl").write_text(content, encoding="utf-8")
+    with pytest.raises(FacesynthError, match="or to none"):
+        tune(model, parts[1], parts[2], journal=tmp_path / "j.jsonl", generations=0)
+
+
+def test_sentences_without_a_name_are_told_apart_by_their_words(tmp_path):
+    corpus = tiny_corpus(tmp_path / "actor", utterances=8, fps=60)
+    table = corpus.path / "utterances.csv"
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows({**row, "sentence": "", "text": f"line {number}"} for number, row in enumerate(rows))
+    parts = split_for_tuning(Corpus.open(corpus.path), 2, 2, seed=0)
+    texts = [{part.record(i).text for i in part.ids} for part in parts]
+    assert len(set.union(*texts)) == sum(map(len, texts)) == 8
 
 
 def test_too_many_sentences_are_refused(parts):
