@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.table import Column, Comparison, Row
 
 COMPARED = (
@@ -56,7 +57,7 @@ class Difference:
 
 
 def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> tuple[Difference, ...]:
-    """Every pair of rows by every figure, with Holm's correction over all of them.
+    """Every pair of methods by every figure, with Holm's correction over all of them; the second take is no method.
 
     A sentence's difference is the mean over its utterances: emotions and takes of one sentence are not independent.
     Sentences are drawn with replacement; p is twice the share of samples whose mean has the other sign. Few sentences
@@ -66,7 +67,7 @@ def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> 
     columns = [column for column in comparison.columns if column.name in figures]
     found: list[tuple[Column, Row, Row, Floats]] = []
     for column in columns:
-        for first, second in combinations(comparison.rows, 2):
+        for first, second in combinations([row for row in comparison.rows if row.label != SECOND_TAKE], 2):
             worse = _worse(first, column, len(sentences)) - _worse(second, column, len(sentences))
             by_sentence = _by_sentence(worse, sentences)
             if (~np.isnan(by_sentence)).sum() >= 2:

@@ -72,6 +72,11 @@ def test_false_alarms_stay_under_the_level():
     assert alarms <= 5
 
 
+def test_a_recording_is_not_compared():
+    rows = [Row("second take", {"lve": [1.0] * 9}), Row("good", {"lve": [2.0] * 9}), Row("bad", {"lve": [3.0] * 9})]
+    assert [(one.first, one.second) for one in compare_pairs(comparison(rows, 9), ("lve",))] == [("good", "bad")]
+
+
 def test_utterances_that_one_of_two_lacks_are_left_out():
     good, bad = Row("good", {"lve": [1, 1, np.nan, 1, 1]}), Row("bad", {"lve": [2, 2, 2, np.nan, 2]})
     assert compare_pairs(comparison([good, bad], 5), ("lve",))[0].sentences == 3
