@@ -22,6 +22,8 @@ DRAWS = 100_000
 CHUNK, WIDTH = 5_000, 128
 """Samples and differences that are computed at once."""
 LEVEL = 0.05
+MOST_NAMED = 12
+"""Pairs that cannot be told apart are named one by one up to so many."""
 
 Floats = NDArray[np.float64]
 
@@ -135,6 +137,8 @@ def _statement(pairs: Sequence[Difference]) -> str:
         return "no two methods can be told apart."
     ranked = sorted(beaten.items(), key=lambda item: (-len(item[1]), item[0]))
     text = "; ".join(f"{winner} is better than {', '.join(losers)}" for winner, losers in ranked)
+    if len(alike) > MOST_NAMED:
+        return f"{text}. The other {len(alike)} of {len(pairs)} pairs are not told apart."
     return f"{text}. Not to be told apart: {'; '.join(alike)}." if alike else f"{text}. Every pair is told apart."
 
 
