@@ -36,6 +36,8 @@ def family_figure(comparison: Comparison, family: Family) -> str:
             axis.set_xlabel("minutes learned from" if family.axis == "minutes" else family.axis)
             if family.log:
                 axis.set_xscale("log")
+            axis.set_xticks(places, [f"{place:.3g}" for place in places])
+            axis.minorticks_off()
     return as_uri(figure)
 
 

@@ -30,8 +30,13 @@ STYLE = {
 
 
 def colour_of(labels: Sequence[str]) -> dict[str, str]:
-    """A colour for each method, the same in every figure."""
-    return {label: COLOURS[i % len(COLOURS)] for i, label in enumerate(labels)}
+    """A colour for each method, the same in every figure; more methods than there are good colours share a rainbow."""
+    import matplotlib as mpl
+
+    if len(labels) <= len(COLOURS):
+        return dict(zip(labels, COLOURS, strict=False))
+    rainbow = mpl.colormaps["turbo"]
+    return {label: mpl.colors.to_hex(rainbow(i / (len(labels) - 1))) for i, label in enumerate(labels)}
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
@@ -70,7 +75,7 @@ def trade_figure(details: Mapping[str, Details], references: Sequence[str], unit
                 _trade(axis, label, one, name, colours[label], reference=label in references)
         axis.axvline(1, color="#bbbbbb", linewidth=0.8)
         axis.set(xlabel="energy ratio (1 = as much movement as recorded)", ylabel=f"{name} ({unit})", xlim=(-0.05, 1.8))
-    axes[0][1].legend(fontsize=8, frameon=False)
+    figure.legend(*axes[0][1].get_legend_handles_labels(), fontsize=8, frameon=False, loc="outside right upper")
     return as_uri(figure)
 
 
