@@ -172,13 +172,15 @@ def provenance(corpus: Corpus, folds: Sequence[Fold]) -> dict[str, object]:
 
 
 def _keep_second_takes(corpus: Corpus, tested: Corpus, folder: Path) -> int:
-    """Write the second take of every tested utterance that has one; returns how many."""
+    """Write the second take of every tested utterance that has one, remove those of others; returns how many there are."""
     count = 0
     for utterance in track(tested, "second takes", len(tested)):
-        take = second_take(corpus, utterance.id)
-        if take is not None:
-            save_prediction(folder / f"{utterance.id}.npz", utterance.id, retimed(take, utterance.speech.phones))
-            count += 1
+        take, path = second_take(corpus, utterance.id), folder / f"{utterance.id}.npz"
+        if take is None:
+            path.unlink(missing_ok=True)
+            continue
+        save_prediction(path, utterance.id, retimed(take, utterance.speech.phones))
+        count += 1
     return count
 
 

@@ -90,8 +90,11 @@ def test_a_second_take_counts_only_where_there_is_one(result, corpus, tmp_path):
     takes = [r for r in corpus.records if r.take == 2]
     assert result.comparison.scores[SECOND_TAKE]["lve"].utterances == 2 * len(takes)
     alone = corpus.subset([i for i in corpus.ids if i.endswith("t1")])
+    stale = tmp_path / "predictions" / SECOND_TAKE / f"{alone.ids[0]}.npz"
+    save_prediction(stale, alone.ids[0], alone[alone.ids[0]].motion)
     evaluation = evaluate(QUICK[:1], alone, make_folds(alone, 2), tmp_path)
     assert "not available" in evaluation.comparison.markdown()
+    assert not stale.exists()
 
 
 def test_figures_can_be_computed_again_from_what_was_kept(result, corpus, folds, folder):
