@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
@@ -78,10 +81,21 @@ def evaluate(
     write_folds(folder / FOLDS, corpus, folds)
     predictions = folder / PREDICTIONS
     jobs = [Job(corpus.path, predictions, one, fold, number, seed) for number, fold in enumerate(folds, 1) for one in contestants]
-    for _ in spread(run_job, jobs, workers, "training and speaking"):
-        pass
+    with _alone_in(folder):
+        for _ in spread(run_job, jobs, workers, "training and speaking"):
+            pass
     labels = [one.label for one in contestants]
     return judge_predictions(corpus, folds, predictions, labels, seed=seed, workers=workers)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Two runs in one folder would take each other's half-made predictions away."""
+    try:
+        with FileLock(folder / ".lock", timeout=0):
+            yield
+    except Timeout:
+        raise FacesynthError(f"another comparison is writing to {folder}; wait for it, or choose another folder") from None
 
 
 def judge_predictions(

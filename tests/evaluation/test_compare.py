@@ -4,6 +4,7 @@ import shutil
 import numpy as np
 import pytest
 from corpora import tiny_corpus
+from filelock import FileLock
 
 from facesynth.corpus.workers import Workers
 from facesynth.errors import FacesynthError
@@ -219,6 +220,11 @@ def test_what_cannot_be_compared_is_refused(corpus, folds, tmp_path):
         evaluate(QUICK, corpus, [Fold(corpus.ids, ())], tmp_path)
     with pytest.raises(FacesynthError, match="no such folder"):
         folds_beside(tmp_path / "nothing", corpus)
+
+
+def test_two_runs_do_not_share_a_folder(corpus, folds, tmp_path):
+    with FileLock(tmp_path / ".lock"), pytest.raises(FacesynthError, match="another comparison"):
+        evaluate(QUICK[:1], corpus, folds, tmp_path)
 
 
 def test_the_whole_result_is_plain_json(result):
