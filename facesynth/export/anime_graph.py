@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.errors import FacesynthError
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
@@ -20,7 +21,9 @@ COLUMNS = (
 
 
 def anime_graph_content(model: AnimeGraph) -> Content:
-    """Everything that the runtime needs of a trained graph."""
+    """Everything that the runtime needs of a trained graph; FacesynthError where its search is another one."""
+    if model.config["temperature"] > 0:
+        raise FacesynthError("the runtime takes the cheapest path; export an anime graph that was trained with temperature=0")
     parts, unit = model.components, model.fitted_layout.unit
     mean, mixing, analysis = parts.mean.numpy(), parts.mixing.numpy(), parts.analysis.numpy()
     tensors = {name: tensor.cpu().numpy() for name, tensor in model.nodes.named_buffers()}

@@ -267,3 +267,22 @@ def test_jumps_can_be_bridged_without_recorded_pairs(corpus, unseen):
     hows = [{join.how for join in blend(m.chooser, m.plan(utterance.speech), m.fps)[1].joins.values()} for m in (model, plain)]
     assert "help" in hows[0]
     assert hows[1] == {"extension"}
+
+
+def test_with_a_temperature_the_motion_is_the_mean_over_paths(unseen):
+    model, utterance = unseen
+    soft = AnimeGraph(temperature=2.0, jump_weight=10.0, jump_cost_weight=3.0, audio_weight=1.5)
+    soft.layout, soft.fps, soft.emotions, soft.facts = model.layout, model.fps, model.emotions, model.facts
+    soft.audio, soft.components, soft.maps, soft.nodes = model.audio, model.components, model.maps, model.nodes
+    soft.register_buffer("cutoffs_hz", model.cutoffs_hz)
+    mean, cheapest = soft.synthesize(utterance.speech), model.synthesize(utterance.speech)
+    assert mean.frames.shape == cheapest.frames.shape
+    assert np.abs(np.diff(mean.frames, axis=0)).sum() < np.abs(np.diff(cheapest.frames, axis=0)).sum()
+    soft.config["temperature"] = 0.0
+    soft.weights = model.weights
+    np.testing.assert_array_equal(soft.synthesize(utterance.speech).frames, cheapest.frames)
+
+
+def test_a_temperature_below_zero():
+    with pytest.raises(FacesynthError, match="temperature"):
+        AnimeGraph(temperature=-1.0)

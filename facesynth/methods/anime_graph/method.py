@@ -35,6 +35,7 @@ from facesynth.methods.anime_graph.maps import EmotionMaps, FittedMap
 from facesynth.methods.anime_graph.parallel import Take, emotion_pairs, take_of
 from facesynth.methods.anime_graph.plan import Plan, Wish, blend, explain, make_plan
 from facesynth.methods.anime_graph.search import Weights
+from facesynth.methods.anime_graph.soft import mean_motion
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import FaceStream, Stream
 from facesynth.methods.method import Method
@@ -70,6 +71,8 @@ class AnimeGraph(Method):
         kernel, number of K-means centres.
     emotional_components : list of int, optional
         Which components the maps change, in place of the automatic split.
+    temperature : float
+        0 is the cheapest path (the paper); above, the mean over all paths, the cheaper the more, in the unit of eq. 2.
     help_pairs : bool
         Whether a recorded pair of the two phones helps to bridge a jump; without, every jump is a cross-fade.
     """
@@ -89,6 +92,7 @@ class AnimeGraph(Method):
         map_centres: int = 250,
         emotional_components: Sequence[int] | None = None,
         help_pairs: bool = True,
+        temperature: float = 0.0,
     ) -> None:
         super().__init__(
             variance=variance,
@@ -101,7 +105,10 @@ class AnimeGraph(Method):
             map_centres=map_centres,
             emotional_components=emotional_components,
             help_pairs=help_pairs,
+            temperature=temperature,
         )
+        if not 0 <= temperature < float("inf"):
+            raise FacesynthError(f"temperature must be 0 (the cheapest path) or above; got {temperature}")
         self.weights = Weights(jump_weight, jump_cost_weight, audio_weight)
         self.audio = AudioFeatures(parameters)
         self.components = FaceComponents()
@@ -230,10 +237,15 @@ class AnimeGraph(Method):
         to_emotion, to_intensity: find motion in the speech's own emotion and map it to this one.
         """
         plan = self.plan(speech, look_ahead=look_ahead)
-        moved, _ = blend(self.chooser, plan, self.fps)
-        motion = self._motion(low_pass(moved, self.cutoffs_hz.numpy(), self.fps), speech)
+        motion = self._motion(low_pass(self._joined(plan), self.cutoffs_hz.numpy(), self.fps), speech)
         motion = self._with_intensity(motion, speech)
         return motion if to_emotion is None else self.map_along(motion, speech, to_emotion, intensity=to_intensity)
+
+    def _joined(self, plan: Plan) -> NDArray[np.float64]:
+        """[frames, D] the phones one after the other, not yet smoothed."""
+        if temperature := self.config["temperature"]:
+            return mean_motion(self.chooser, plan, self.weights, temperature)
+        return blend(self.chooser, plan, self.fps)[0]
 
     def map_along(self, motion: Motion, speech: Speech, target: str, *, intensity: float = 1.0) -> Motion:
         """Any motion of the learned layout that goes with speech, from the speech's emotions to another one."""
