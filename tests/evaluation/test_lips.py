@@ -5,6 +5,7 @@ from talking_points import FPS, LAYOUT, face, phones, talk
 from facesynth.errors import FacesynthError
 from facesynth.evaluation import lips, timing
 from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.time_alignment import dtw_path
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
@@ -116,15 +117,15 @@ def test_warping_path_is_the_least_over_all_paths():
         if i < 0 or j < 0:
             return np.inf
         before = 0 if i == j == 0 else min(least(a, b, i - 1, j - 1), least(a, b, i - 1, j), least(a, b, i, j - 1))
-        return (a[i] - b[j]) ** 2 + before
+        return ((a[i] - b[j]) ** 2).sum() + before
 
     for _ in range(5):
-        a, b = rng.normal(size=(2, 6))
-        path = timing._dtw_path(a, b, 6)
+        a, b = rng.normal(size=(2, 6, 2))
+        path = dtw_path(a, b, 6)
         assert ((a[path[:, 0]] - b[path[:, 1]]) ** 2).sum() == pytest.approx(least(a, b, 5, 5))
         assert path[[0, -1]].tolist() == [[0, 0], [5, 5]]
         assert (np.diff(path, axis=0) >= 0).all()
-        assert (np.abs(np.diff(timing._dtw_path(a, b, 1), axis=1)) <= 1).all()
+        assert (np.abs(np.diff(dtw_path(a, b, 1), axis=1)) <= 1).all()
 
 
 def test_curves_open_the_mouth_of_the_built_in_head():
