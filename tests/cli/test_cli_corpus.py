@@ -48,7 +48,9 @@ def test_from_nothing_to_statistics(tmp_path, layout_file, session):
     report = json.loads(run("add", folder, session, "--emotion", "happy", "--json"))
     assert (len(report["added"]), report["refused"]) == (3, {})
     assert "already there 3" in run("add", folder, session)
-    assert json.loads(run("check", folder, "--json")) == {"problems": []}
+    found = json.loads(run("check", folder, "--json"))["problems"]
+    assert {row["grave"] for row in found} == {False}
+    assert any("too few for efase" in row["what"] for row in found), "three clips are not much to learn from"
     assert json.loads(run("stats", folder, "--json"))["emotions"] == {"neutral": 0, "happy": 3}
     assert "3 usable of 3" in run("stats", folder)
     assert "kept 3" in run("align", folder)
@@ -85,9 +87,11 @@ def test_a_layout_may_come_from_another_corpus(tmp_path):
 
 def test_grave_problems_leave_with_code_2(tmp_path):
     corpus = tiny_corpus(tmp_path / "tiny", 4)
-    assert run("check", corpus.path) == "nothing is wrong\n"
+    notes = run("check", corpus.path)
+    assert "0 problems" in notes
+    assert "too few for efase" in notes
     corpus.files.audio(corpus.ids[0]).unlink()
-    assert "1 problems, 0 notes" in run("check", corpus.path, code=2)
+    assert "1 problems" in run("check", corpus.path, code=2)
 
 
 @pytest.mark.parametrize(
