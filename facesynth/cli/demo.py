@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,16 +113,44 @@ def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
 
 
 def _speech(seed: int) -> Speech:
+    """What the demo says, from the cache or said now; what is read back is what was written, in both cases."""
+    import numpy as np
+
+    from facesynth import __version__
+    from facesynth.cache import cache_dir
+    from facesynth.performer.lines import DEMO_LINES
+    from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+
+    made_of = json.dumps([__version__, DEMO_LINES, seed])
+    path = cache_dir("models") / f"demo-speech-{sha256(made_of.encode()).hexdigest()[:16]}.npz"
+    if not path.exists():
+        _keep_speech(path, seed)
+    with np.load(path, allow_pickle=False) as kept:
+        phones = PhoneTrack(tuple(kept["phones"].tolist()), kept["phone_ends_s"])
+        emotions = EmotionTrack(tuple(kept["emotions"].tolist()), kept["emotion_ends_s"], np.ones(len(kept["emotions"])))
+        return Speech(kept["audio"], int(kept["rate"]), phones, emotions, " ".join(text for text, _ in DEMO_LINES))
+
+
+def _keep_speech(path: Path, seed: int) -> None:
+    import numpy as np
+
+    from facesynth.atomic import atomic_path
     from facesynth.performer.lines import DEMO_LINES, speak_lines
     from facesynth.speech.alignment import align
-    from facesynth.speech.speech import Speech
 
     lines = speak_lines(DEMO_LINES, seed=seed)
-    aligned = align(lines.audio, lines.rate, lines.text)
-    track = lines.emotions
-    ends = track.ends_s.copy()
-    ends[-1] = aligned.phones.duration_s
-    return Speech(lines.audio, lines.rate, aligned.phones, replace(track, ends_s=ends), lines.text)
+    phones = align(lines.audio, lines.rate, lines.text).phones
+    ends_s = [*lines.emotions.ends_s[:-1], phones.duration_s]
+    arrays = {
+        "audio": lines.audio,
+        "rate": np.array(lines.rate),
+        "phones": np.array(phones.labels),
+        "phone_ends_s": phones.ends_s,
+        "emotions": np.array(lines.emotions.labels),
+        "emotion_ends_s": np.array(ends_s),
+    }
+    with atomic_path(path) as part:
+        np.savez(part, allow_pickle=False, **arrays)
 
 
 def _report(clock: Clock, written: list[Path], fresh: bool, corpus: Path, as_json: bool) -> None:
