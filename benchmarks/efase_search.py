@@ -2,7 +2,8 @@
 
     python benchmarks/efase_search.py [--corpus FOLDER]
 
-The weights are those that `Efase` has by default; `--published` takes those of Deng 2006.
+The weights are those of Deng 2006, PNT 10 times the median rule-2 transition; `--found` takes weights and PNT that
+`Efase` has by default.
 Without a corpus the database is generated: English phone sequences (words of CMUdict at random),
 each phone a target in 25 dimensions with falling variance, co-articulated by a Gaussian window and
 varied from node to node. Seed and PNT are printed. Times are ratios against the dense search in the same run.
@@ -81,10 +82,10 @@ def subsample(nodes, count, seed=SEED):
     return nodes.take(np.sort(keep))
 
 
-def weights_for(nodes, penalty, published):
+def weights_for(nodes, penalty, found):
     from facesynth.methods.efase.method import Efase
 
-    unit = Weights(1.0) if published else replace(Efase().weights(), pnt=1.0)
+    unit = replace(Efase().weights(), pnt=1.0) if found else Weights(1.0)
     return replace(unit, pnt=penalty * median_transition(nodes, unit))
 
 
@@ -122,14 +123,14 @@ def against_dense(nodes, query, weights):
             print(f"  the {year} paper on its machine, 5,556 nodes: {seconds[len(query)]} s")
 
 
-def growth(nodes_of, query_of, penalty, published):
+def growth(nodes_of, query_of, penalty, found):
     seconds = []
     sizes = []
     for size in SIZES:
         nodes = nodes_of(size)
         if sizes and len(nodes) < 1.5 * sizes[-1]:
             break
-        weights = weights_for(nodes, penalty, published)
+        weights = weights_for(nodes, penalty, found)
         query = query_of(nodes)
         best, found = timed(lambda n=nodes, w=weights, q=query: search(build_index(n, w), q))
         print(f"  N = {len(nodes):6d}: {best:.3f} s, phi computed {found.evaluated:.2%}", flush=True)
@@ -141,11 +142,13 @@ def growth(nodes_of, query_of, penalty, published):
 
 
 def main():
+    from facesynth.methods.efase.method import Efase
+
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpus", help="folder of a corpus to take the nodes from")
     parser.add_argument("--phones", type=int, default=63)
     parser.add_argument("--penalty", type=float, nargs="+", default=[10.0], help="PNT over the median rule-2 cost")
-    parser.add_argument("--published", action="store_true", help="weights of Deng 2006")
+    parser.add_argument("--found", action="store_true", help="the default weights and PNT of Efase")
     options = parser.parse_args()
     torch.manual_seed(SEED)
     print(f"seed {SEED}; nodes {f'of {options.corpus}' if options.corpus else 'generated'}; phone sequences generated")
@@ -158,12 +161,12 @@ def main():
         return generated_query(nodes, options.phones)
 
     search(build_index(generated_nodes(200), Weights(1.0)), generated_query(generated_nodes(200), 5))  # compile
-    for penalty in options.penalty:
+    for penalty in [Efase().config["penalty"]] if options.found else options.penalty:
         nodes = nodes_of(5556)
-        weights = weights_for(nodes, penalty, options.published)
+        weights = weights_for(nodes, penalty, options.found)
         against_dense(nodes, query_of(nodes), weights)
         print(f"growth of (a), PNT = {penalty} x median:")
-        growth(nodes_of, query_of, penalty, options.published)
+        growth(nodes_of, query_of, penalty, options.found)
 
 
 if __name__ == "__main__":
