@@ -123,14 +123,14 @@ def against_dense(nodes, query, weights):
             print(f"  the {year} paper on its machine, 5,556 nodes: {seconds[len(query)]} s")
 
 
-def growth(nodes_of, query_of, penalty, found):
+def growth(nodes_of, query_of, penalty, defaults):
     seconds = []
     sizes = []
     for size in SIZES:
         nodes = nodes_of(size)
         if sizes and len(nodes) < 1.5 * sizes[-1]:
             break
-        weights = weights_for(nodes, penalty, found)
+        weights = weights_for(nodes, penalty, defaults)
         query = query_of(nodes)
         best, found = timed(lambda n=nodes, w=weights, q=query: search(build_index(n, w), q))
         print(f"  N = {len(nodes):6d}: {best:.3f} s, phi computed {found.evaluated:.2%}", flush=True)
