@@ -123,9 +123,9 @@ def add(
     """Add recordings to the corpus in FOLDER.
 
     FILES are files or folders. A recording is a video, whose face is captured; or a sound (or a video with sound) and a
-    motion file (.npz, .csv) of the same name. Beside them may lie NAME.TextGrid (or .lab), NAME.txt and
-    NAME.emotions.csv. A FOLDER that is no corpus becomes one that fits the videos. Without phones and text,
-    the phones are recognised from the sound. A run that was interrupted can be repeated.
+    motion file (.npz, .csv) of the same name. Beside them may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd:
+    lines of `start end word`) and NAME.emotions.csv. A FOLDER that is no corpus becomes one that fits the videos.
+    Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated.
     """
     from facesynth.corpus import Corpus
     from facesynth.corpus.add import add as add_recordings
@@ -314,8 +314,8 @@ def _keep_videos(corpus: Corpus, files: Iterable[Path], ids: set[str], listed: M
 
     if not is_tracked(corpus.layout):
         return
-    from facesynth.corpus.add import VIDEO, find_recordings
     from facesynth.corpus.importers.points import keep_videos
+    from facesynth.corpus.recordings import VIDEO, find_recordings
 
     videos = {listed.get(r.name, r.name): r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
     alone = len(ids) == len(videos) == 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.motion_files import load_motion
 from facesynth.corpus.record import Record
+from facesynth.corpus.recordings import VIDEO, Recording, find_recordings, words_of
 from facesynth.corpus.signals import hash_signals
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
@@ -20,38 +20,8 @@ from facesynth.speech.audio import load_audio
 from facesynth.speech.segments import Segment
 from facesynth.speech.speech import Speech
 
-AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
-VIDEO = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg"})
-MOTION = frozenset({".npz", ".csv"})
-PHONES = frozenset({".textgrid", ".lab", ".phn"})
-EMOTIONS = ".emotions.csv"
-KINDS = {
-    "sound": AUDIO | VIDEO,
-    "motion": MOTION,
-    "phones": PHONES,
-    "text": frozenset({".txt"}),
-    "emotions": frozenset({EMOTIONS}),
-}
-SINGLE = ("sound", "motion")
-BESIDE = frozenset({"layout.yaml", "channels.txt", "LICENSE", "README.md"})
-"""What lies in folders of recordings and is none."""
-
 Task = tuple[Corpus, Record, "Recording", int | None]
 """Arguments of `prepare`."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """The files of one recording."""
-
-    name: str
-    """The name that they share, without suffix."""
-    sound: Path
-    motion: Path
-    """A motion file, or the video of which the face is captured."""
-    phones: Path | None = None
-    text: Path | None = None
-    emotions: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,96 +158,6 @@ def _keep(corpus: Corpus, prepared: Prepared) -> tuple[str, ...]:
     return prepared.remarks
 
 
-def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:
-    """Recordings among files and in folders, by name, and why others are none.
-
-    Files of one recording share their name: `a.wav`, `a.npz` (or `a.csv`) and, if there are any, `a.TextGrid` (or `a.lab`),
-    `a.txt` (its words) and `a.emotions.csv`. A video without a motion file is both, or the motion where a sound that was
-    recorded separately lies beside it. One sound and one motion file alone belong together whatever they are called.
-    """
-    files = [file for path in paths for file in _listed(Path(path))]
-    groups: dict[str, dict[str, list[Path]]] = {}
-    refused: dict[str, str] = {}
-    for file in files:
-        name, kind = _name_and_kind(file)
-        if kind is None:
-            refused[file.name] = f"{file.suffix or 'a file without suffix'} is neither sound, motion, phones nor text"
-        else:
-            groups.setdefault(name, {}).setdefault(kind, []).append(file)
-    groups = _married(groups)
-    recordings = []
-    for name, found in sorted(groups.items()):
-        group = _with_video(found)
-        fault = _fault(group)
-        if fault:
-            refused[name] = fault
-        else:
-            recordings.append(Recording(name, **{kind: files[0] for kind, files in group.items()}))
-    return recordings, refused
-
-
-def _listed(path: Path) -> list[Path]:
-    if path.is_dir():
-        return sorted(file for file in path.iterdir() if file.is_file() and not _is_no_recording(file))
-    if not path.is_file():
-        raise FacesynthError(f"{path}: no such file or folder")
-    return [path]
-
-
-def _is_no_recording(file: Path) -> bool:
-    return file.name.startswith(".") or file.name in BESIDE
-
-
-def _name_and_kind(file: Path) -> tuple[str, str | None]:
-    name = unicodedata.normalize("NFC", file.name)
-    for kind, suffixes in reversed(KINDS.items()):
-        for suffix in suffixes:
-            if name.lower().endswith(suffix):
-                return name[: -len(suffix)], kind
-    return name, None
-
-
-def _married(groups: dict[str, dict[str, list[Path]]]) -> dict[str, dict[str, list[Path]]]:
-    """One sound and one motion file alone are one recording, called as the sound."""
-    sounds = [name for name, group in groups.items() if "sound" in group]
-    motions = [name for name, group in groups.items() if "motion" in group]
-    if len(sounds) != 1 or len(motions) != 1:
-        return groups
-    one: dict[str, list[Path]] = {}
-    for group in groups.values():
-        for kind, files in group.items():
-            one.setdefault(kind, []).extend(files)
-    return {sounds[0]: one}
-
-
-def _with_video(group: dict[str, list[Path]]) -> dict[str, list[Path]]:
-    """A video shows the motion where no motion file does."""
-    videos = [file for file in group.get("sound", ()) if file.suffix.lower() in VIDEO]
-    if "motion" in group or len(videos) != 1:
-        return group
-    sounds = [file for file in group["sound"] if file not in videos]
-    return {**group, "sound": sounds or videos, "motion": videos}
-
-
-def _fault(group: Mapping[str, list[Path]]) -> str:
-    for kind in SINGLE:
-        if kind not in group:
-            have = " and ".join(file.name for files in group.values() for file in files)
-            why = "; motion without sound teaches no speech" if kind == "sound" else ""
-            return f"there is no {kind} file of this name beside {have}{why}"
-    for kind, files in group.items():
-        if len(files) > 1:
-            return f"there are {len(files)} files of {kind}: {', '.join(file.name for file in files)}; leave one"
-    return ""
-
-
 def _with_text(record: Record, path: Path | None) -> Record:
     """The record with the words of the file beside the recording, where it has none of its own."""
-    return replace(record, text=_words(path)) if path is not None and not record.text else record
-
-
-def _words(path: Path) -> str:
-    try:
-        return " ".join(path.read_text(encoding="utf-8-sig").split())
-    except UnicodeDecodeError:
-        raise FacesynthError(f"{path} is not text in UTF-8; save it again") from None
+    return replace(record, text=words_of(path)) if path is not None and not record.text else record

@@ -32,6 +32,6 @@ def read_transcripts(path: str | Path) -> dict[str, str]:
 
 
 def _without_suffix(file: str) -> str:
-    from facesynth.corpus.add import AUDIO, VIDEO
+    from facesynth.corpus.recordings import AUDIO, VIDEO
 
     return file[: -len(Path(file).suffix)] if Path(file).suffix.lower() in AUDIO | VIDEO else file

@@ -32,7 +32,7 @@ def read_textgrid(path: str | Path) -> tuple[PhoneTrack, Words]:
         track = phone_track(_segments(phones), float(grid.maxTimestamp))
     except FacesynthError as error:
         raise FacesynthError(f"{path}: {error}") from None
-    return track, () if words is None else tuple(entry for entry in _segments(words) if not _is_silence_mark(entry[0]))
+    return track, () if words is None else tuple(entry for entry in _segments(words) if not is_silence_mark(entry[0]))
 
 
 def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment] = ()) -> None:
@@ -100,8 +100,9 @@ def _segments(tier: Any) -> Iterable[Segment]:
     return ((entry.label, float(entry.start), float(entry.end)) for entry in tier.entries)
 
 
-def _is_silence_mark(word: str) -> bool:
-    return word.strip().lower() in {"", "sp", "sil", "<sil>", "<eps>", "spn", "<p:>", "#", SILENCE}
+def is_silence_mark(word: str) -> bool:
+    """Whether an aligner's word stands for none: `sil`, `sp`, empty and the like."""
+    return word.strip().lower() in {"", "sp", "sil", "<sil>", "<eps>", "spn", "h#", "<p:>", "#", SILENCE}
 
 
 def _lines(path: Path) -> Iterable[tuple[int, str]]:

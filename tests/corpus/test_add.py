@@ -136,6 +136,24 @@ def test_words_of_a_textgrid_are_the_text(session, tmp_path):
     assert corpus.record(record.id).text == "good day"
 
 
+def test_a_word_file_beside_the_recording_is_the_text(session, tmp_path):
+    record = tiny_utterances(1)[0][0]
+    (session / f"{record.id}.txt").unlink()
+    (session / f"{record.id}.align").write_text("0 2000 sil\n2000 9000 good\n9000 20000 day\n20000 21000 sp\n", encoding="utf-8")
+    corpus = new_corpus(tmp_path / "c")
+    add(corpus, [session])
+    assert corpus.record(record.id).text == "good day"
+
+
+def test_a_word_file_of_another_form_refuses_its_recording_alone(session, tmp_path):
+    record = tiny_utterances(1)[0][0]
+    (session / f"{record.id}.txt").unlink()
+    (session / f"{record.id}.align").write_text("good day\n", encoding="utf-8")
+    report = add(new_corpus(tmp_path / "c"), [session])
+    assert "is not `start end word`" in report.refused[record.id]
+    assert len(report.added) == 2
+
+
 def test_real_speech_with_its_words_is_aligned_and_may_be_aligned_anew(recordings, tmp_path):
     sound = min(recordings("ravdess_speech").rglob("03-01-01-01-01-01-01.flac"))
     wave = 0.1 * np.sin(np.arange(600) / 7)[:, None, None]

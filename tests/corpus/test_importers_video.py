@@ -12,8 +12,9 @@ from facesynth.capture.models import MODELS, _kept
 from facesynth.capture.shape import neutral_shape
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add, find_recordings
+from facesynth.corpus.add import add
 from facesynth.corpus.importers.video import corpus_from_video, motion_from_video
+from facesynth.corpus.recordings import find_recordings
 from facesynth.corpus.transcripts import read_transcripts
 from facesynth.corpus.workers import Workers
 from facesynth.errors import FacesynthError

@@ -22,9 +22,9 @@ from facesynth.capture.points.footage import Footage, read_footage
 from facesynth.capture.points.kept_shapes import kept_shapes, load_shapes, save_shapes
 from facesynth.capture.points.reference import Reference
 from facesynth.capture.points.shapes import Shapes
-from facesynth.corpus.add import VIDEO, Recording, find_recordings
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import check_id
+from facesynth.corpus.recordings import VIDEO, Recording, find_recordings
 from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
 from facesynth.motion.planar import tracked_layout
