@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
@@ -53,7 +55,7 @@ def spread(function: Callable[[Item], Result], items: Sequence[Item], workers: W
     results until then were yielded.
     """
     if workers.engine == "ray" and len(items):
-        return track(_on_ray(function, items, workers), what, len(items))
+        return track(_quietly(_on_ray(function, items, workers)), what, len(items))
     if workers.jobs == 1 or len(items) < 2:
         return track(map(function, items), what, len(items))
     return track(_persistent(function, items, workers.jobs), what, len(items))
@@ -78,6 +80,12 @@ def _pooled(function: Callable[[Item], Result], items: Sequence[Item], jobs: int
             yield from pool.map(function, items)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _quietly(results: Iterator[Result]) -> Iterator[Result]:
+    """The same results; what Ray tells of dead workers meanwhile goes to stderr, for stdout may be somebody's JSON."""
+    with redirect_stdout(sys.stderr):
+        yield from results
 
 
 def _on_ray(function: Callable[[Item], Result], items: Sequence[Item], workers: Workers) -> Iterator[Result]:
