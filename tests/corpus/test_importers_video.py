@@ -88,8 +88,9 @@ def test_two_processes_give_the_same_bytes_as_one(clips, tmp_path):
 @pytest.mark.slow
 def test_killed_fifty_times_while_following_faces_gives_the_same_corpus(clips, tmp_path, monkeypatch):
     """Every fifth time all tracks are forgotten, so that the end also comes while a face is followed."""
+    models = _kept("landmarks").parent
     monkeypatch.setenv("FACESYNTH_CACHE", str(tmp_path / "cache"))
-    shutil.copytree(_kept("landmarks").parent, tmp_path / "cache" / "landmarks")
+    shutil.copytree(models, tmp_path / "cache" / "landmarks")
     options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--performer", "A"]
     killed_and_repeated(options, tmp_path, 50, seed=6, forget=tmp_path / "cache" / "tracks")
 
