@@ -13,17 +13,18 @@ from filelock import FileLock, Timeout
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
-from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, check_labels
+from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family, check_labels
+from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
 from facesynth.evaluation.jobs import Job, read_account, run_job
 from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.paired import Difference, compare_pairs
-from facesynth.evaluation.predictions import save_prediction
-from facesynth.evaluation.second_take import retimed, second_take
+from facesynth.evaluation.second_take import second_take
 from facesynth.evaluation.table import Column, Comparison, Row
 from facesynth.evaluation.tallies import Task, refuse_strangers, tally
+from facesynth.evaluation.variety import VARIETY
 from facesynth.evaluation.versions import versions
 from facesynth.progress import track
 
@@ -36,8 +37,10 @@ MAIN = (
 """Columns of the short table; everything is in the CSV and the JSON."""
 COSTS = (
     Column("train_s", "s", "low"),
+    Column("train_cpu_s", "s", "low"),
     Column("train_minutes", "min"),
     Column("rtf", "1", "low"),
+    Column("rtf_cpu", "1", "low"),
     Column("peak_mb", "MB", "low"),
     Column("model_mb", "MB", "low"),
 )
@@ -55,6 +58,10 @@ class Evaluation:
     predictions: Path
     accounts: Mapping[str, Sequence[Mapping[str, Any]]]
     """By row label: what the predictions of each fold were made of; nothing for predictions made elsewhere."""
+
+    def curves(self, families: Sequence[Family]) -> tuple[Curve, ...]:
+        """Error against movement, a curve for each method and for each family that is one method."""
+        return curves_of({label: one.trade for label, one in self.details.items()}, families)
 
     def main_columns(self) -> list[str]:
         """Columns of the short table: those of `MAIN` that some method has."""
@@ -114,14 +121,13 @@ def judge_predictions(
     for label in labels:
         refuse_strangers(corpus, predictions / label)
     tested = corpus.subset(sorted(i for fold in folds for i in fold.test))
-    pairs = _keep_second_takes(corpus, tested, predictions / SECOND_TAKE)
     judges = judges_of(corpus, folds, tested)
     reach = residual_reach(track(tested, "recorded movement", len(tested)))
-    tasks = [Task(corpus.path, predictions, label, tested.ids, judges, reach) for label in (SECOND_TAKE, *labels)]
+    tasks = [Task(corpus.path, corpus.ids, predictions, label, tested.ids, judges, reach) for label in (SECOND_TAKE, *labels)]
     judged = list(spread(tally, tasks, workers, "judging"))
     accounts = {label: _accounts(predictions / label, len(folds)) for label in labels}
     rows = [_with_costs(one.row, accounts.get(one.row.label, ()), one.costs) for one in judged]
-    rows[0] = _explain_second_take(rows[0], pairs)
+    rows[0] = _explain_second_take(rows[0], corpus, tested)
     recorded = [pair for fold in folds for pair in judges[fold.test[0]].recorded(corpus.subset(fold.test))]
     comparison = Comparison(
         _columns(rows, tested),
@@ -185,22 +191,9 @@ def provenance(corpus: Corpus, folds: Sequence[Fold]) -> dict[str, object]:
     }
 
 
-def _keep_second_takes(corpus: Corpus, tested: Corpus, folder: Path) -> int:
-    """Write the second take of every tested utterance that has one, remove those of others; returns how many there are."""
-    count = 0
-    for utterance in track(tested, "second takes", len(tested)):
-        take, path = second_take(corpus, utterance.id), folder / f"{utterance.id}.npz"
-        if take is None:
-            path.unlink(missing_ok=True)
-            continue
-        save_prediction(path, utterance.id, retimed(take, utterance.speech.phones))
-        count += 1
-    return count
-
-
-def _explain_second_take(row: Row, count: int) -> Row:
+def _explain_second_take(row: Row, corpus: Corpus, tested: Corpus) -> Row:
     reasons = {**row.reasons, **{column.name: "a recording costs nothing to compute" for column in COSTS}}
-    if not count:
+    if not any(second_take(corpus, utterance_id) for utterance_id in tested.ids):
         reasons |= {metric.name: "not available: no second recording of these sentences and emotions" for metric in METRICS}
     return replace(row, reasons=reasons)
 
@@ -212,7 +205,7 @@ def _accounts(folder: Path, count: int) -> list[dict[str, Any]]:
 def _with_costs(row: Row, accounts: Sequence[Mapping[str, Any]], costs: Mapping[str, float]) -> Row:
     """Means over the folds; the largest for memory. Reasons say why predictions made elsewhere have none."""
     found = dict(costs)
-    for name in ("train_s", "train_minutes", "model_mb", "peak_mb"):
+    for name in ("train_s", "train_cpu_s", "train_minutes", "model_mb", "peak_mb"):
         known = [float(one[name]) for one in accounts if one.get(name) is not None]
         if known:
             found[name] = max(known) if name == "peak_mb" else sum(known) / len(known)
@@ -224,6 +217,7 @@ def _columns(rows: Sequence[Row], tested: Corpus) -> tuple[Column, ...]:
     """Metrics, the emotion's, the joins', the methods' own figures in order of appearance, and the costs."""
     known = [Column(metric.name, metric.unit_in(tested.layout.unit), metric.best) for metric in METRICS]
     known.append(Column("emotion_accuracy", "1", "high"))
+    known += [Column(name, tested.layout.unit, "" if name == "diversity" else "low") for name in VARIETY]
     names = {column.name for column in known}
     own = list(dict.fromkeys(name for row in rows for name in row.values if name not in names))
     return (*known, *(Column(name, "1", "1" if name == "join_jump" else "") for name in own), *COSTS)

@@ -19,7 +19,7 @@ SECOND_TAKE = "second take"
 """The label of the row that is a recording."""
 REFERENCES: Mapping[str, str] = {"mean face": "mean_face", "phone mean": "phone_mean", "ridge": "ridge", "tcn": "tcn"}
 """Label and method of the rows without which no figure can be judged."""
-FAMILY_KEYS = ("title", "method", "include", "axis", "log", "variants")
+FAMILY_KEYS = ("title", "method", "include", "axis", "log", "curve", "variants")
 OWN_KEYS = ("minutes", "speak", "method")
 """Keys of a variant that are not settings of its method."""
 
@@ -68,6 +68,9 @@ class Family:
     values: tuple[float, ...] = ()
     """Each variant's place on the axis."""
     log: bool = False
+    curve: str = ""
+    """What the variants are called together, where they are one method under several settings: one curve of error
+    against movement."""
 
 
 def references() -> list[Contestant]:
@@ -93,7 +96,7 @@ def check_labels(contestants: Sequence[Contestant]) -> None:
 
 
 def read_family(path: str | Path) -> tuple[Family, list[Contestant]]:
-    """A family and its variants from a YAML file: `title`, `method`, `variants`, and optionally `include`, `axis`, `log`.
+    """A family and its variants from a YAML file: `title`, `method`, `variants`, perhaps `include`, `axis`, `log`, `curve`.
 
     `include` names a settings file beside it that all variants start from. `variants` maps a label to what differs:
     settings of the method, `minutes` to learn from, `speak` for options of the synthesis, or another `method`.
@@ -103,7 +106,8 @@ def read_family(path: str | Path) -> tuple[Family, list[Contestant]]:
     check_labels(contestants)
     axis = str(plain.get("axis") or "")
     values = tuple(_place(one, axis) for one in contestants) if axis else ()
-    return Family(str(plain["title"]), tuple(one.label for one in contestants), axis, values, bool(plain.get("log"))), contestants
+    labels, curve = tuple(one.label for one in contestants), str(plain.get("curve") or "")
+    return Family(str(plain["title"]), labels, axis, values, bool(plain.get("log")), curve), contestants
 
 
 def load_family(path: Path) -> dict[str, Any]:

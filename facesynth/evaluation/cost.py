@@ -1,47 +1,69 @@
-"""What a method costs: memory and the size of its file. Times are taken where the work is done."""
+"""What a method costs: time by the clock and of the processor, and memory."""
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-
-from facesynth.methods.method import Method
+from typing import Any
 
 MB = 1e6
-_PROC = Path("/proc/self")
+_STATUS = Path("/proc/self/status")
 
 
 @dataclass
-class PeakMemory:
-    """Filled when the block of `peak_memory` ends."""
+class Spent:
+    """Filled when the block of `stopwatch` ends."""
 
-    mb: float = float("nan")
-    """Largest resident memory of the process inside the block (1e6 bytes); NaN where the system does not tell."""
+    clock_s: float = 0.0
+    """What a clock on the wall shows: longer where other programs run beside this one."""
+    processor_s: float = 0.0
+    """What the processor worked for this process; one thread on an idle computer needs as long by the clock."""
 
 
 @contextmanager
-def peak_memory() -> Iterator[PeakMemory]:
-    """Measure the largest resident memory of the whole process, Python and torch included, inside the block.
+def stopwatch() -> Iterator[Spent]:
+    """Measure the block, by the clock and by the processor."""
+    spent = Spent()
+    clock, processor = time.perf_counter(), time.process_time()
+    yield spent
+    spent.clock_s, spent.processor_s = time.perf_counter() - clock, time.process_time() - processor
 
-    Linux alone lets a process reset its own high-water mark (`clear_refs`); elsewhere the answer is NaN.
+
+def peak_speaking_mb(model: Path, corpus: Path, utterance_id: str, seed: int, speak: Mapping[str, Any]) -> float | None:
+    """Largest resident memory (1e6 bytes) of a process of its own that loads a model file and speaks one utterance.
+
+    Python, torch and the model included; nothing that was loaded for other methods. None where the system does not
+    tell (any but Linux), or where such a process does not know the method.
     """
-    peak = PeakMemory()
-    try:
-        (_PROC / "clear_refs").write_text("5")
-    except OSError:
-        yield peak
-        return
-    yield peak
-    line = next(line for line in (_PROC / "status").read_text().splitlines() if line.startswith("VmHWM:"))
-    peak.mb = int(line.split()[1]) * 1024 / MB
+    task = json.dumps([str(model), str(corpus), utterance_id, seed, dict(speak)])
+    done = subprocess.run([sys.executable, "-m", __name__, task], capture_output=True, text=True, check=False)
+    answer = done.stdout.strip().rpartition("\n")[2]
+    return float(answer) if done.returncode == 0 and answer else None
 
 
-def model_mb(method: Method) -> float:
-    """Size of the file that `Method.save` writes (1e6 bytes)."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model.safetensors"
-        method.save(path)
-        return path.stat().st_size / MB
+def peak_mb() -> float | None:
+    """Largest resident memory of this process until now (1e6 bytes); None where the system does not tell."""
+    if not _STATUS.is_file():
+        return None
+    line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))
+    return int(line.split()[1]) * 1024 / MB
+
+
+def _speak_alone(task: str) -> None:
+    from facesynth.corpus import Corpus
+    from facesynth.methods.registry import load
+
+    model, corpus, utterance_id, seed, speak = json.loads(task)
+    method = load(model)
+    method.synthesize(Corpus.open(corpus)[utterance_id].speech, seed=seed, **speak)
+    print(peak_mb() or "")
+
+
+if __name__ == "__main__":
+    _speak_alone(sys.argv[1])

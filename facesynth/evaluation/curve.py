@@ -2,49 +2,57 @@
 
 Whatever predicts the average is near and moves too little, whatever keeps the motion pays in error. A curve is the set
 of points (`energy_ratio`, `lve`) that a method reaches over its settings, each also with quick movement raised
-(`sharpen`), which any method's motion can be given.
+(`sharpen`), which any method's motion can be given. Beside it stands the same motion made smaller or larger about each
+utterance's mean pose, which no method needs to be asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from facesynth.corpus import Corpus
+from facesynth.evaluation.contestants import SECOND_TAKE, Family
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, lve_centred
-from facesynth.evaluation.pair import Array, UnavailableError
+from facesynth.evaluation.pair import Array
 from facesynth.evaluation.regions import lip_points
-from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.sharpening import sharpen
-from facesynth.methods.method import Method
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
-from facesynth.progress import track
 
 LIVELY = (0.9, 1.1)
 """Energy ratios that count as neither smoothed away nor invented."""
-SHARPENINGS = (0.0, 0.3, 0.6, 1.0, 1.5)
+SHARPENINGS = (0.0, 0.3, 0.6, 0.9, 1.2, 1.6, 2.0)
+GAINS = (0.0, 0.25, 0.5, 0.75, 1.25, 1.5)
+"""Sizes of movement about an utterance's own mean pose, beside 1."""
+VARIATIONS = (*((1.0, share) for share in SHARPENINGS), *((gain, 0.0) for gain in GAINS))
+"""(gain, sharpening) of every point of one setting."""
+
+Measure = Literal["lve", "lve_centred"]
+MEASURES: tuple[Measure, ...] = ("lve", "lve_centred")
 
 
 @dataclass(frozen=True)
 class Point:
-    """One compromise: means over the utterances of a test corpus."""
+    """One compromise: means over the tested utterances."""
 
-    setting: str
-    """What the method was told, in words."""
+    gain: float
+    """Size of the movement about each utterance's mean pose; 1 = as the method made it."""
     sharpening: float
     """How much quick movement was raised afterwards; 0 = as the method made it."""
+    energy_ratio: float
+    lip_energy_ratio: float
+    """The same over the lip points alone: what `lve` looks at."""
     lve: float
     """Unit of the layout."""
     lve_centred: float
     """Unit of the layout."""
-    energy_ratio: float
-    lip_energy_ratio: float
-    """The same over the lip points alone: what `lve` looks at."""
+    setting: str = ""
+    """The label of what made it."""
 
 
 @dataclass(frozen=True)
@@ -53,86 +61,102 @@ class Curve:
 
     label: str
     points: tuple[Point, ...]
+    """All settings and sharpenings."""
+    scaled: tuple[Point, ...] = ()
+    """Every setting with its movement made smaller and larger."""
 
-    @property
-    def nearest(self) -> Point:
-        """The point of least `lve`."""
-        return min(self.points, key=lambda point: point.lve)
+    def nearest(self, measure: Measure = "lve") -> Point:
+        """The point of least error."""
+        return min(self.points, key=lambda point: getattr(point, measure))
 
-    @property
-    def lively(self) -> Point | None:
-        """The point of least `lve` among those whose energy ratio lies in LIVELY; None where there is none."""
+    def lively(self, measure: Measure = "lve") -> Point | None:
+        """The point of least error among those whose energy ratio lies in LIVELY; None where there is none."""
         inside = [point for point in self.points if LIVELY[0] <= point.energy_ratio <= LIVELY[1]]
-        return min(inside, key=lambda point: point.lve, default=None)
+        return min(inside, key=lambda point: getattr(point, measure), default=None)
 
-    @property
-    def front(self) -> tuple[Point, ...]:
+    def front(self, measure: Measure = "lve") -> tuple[Point, ...]:
         """By rising energy, the points that no other point beats in error and in how near the energy is to 1."""
-        kept = [p for p in self.points if not any(_beats(other, p) for other in self.points)]
+        kept = [p for p in self.points if not any(_beats(other, p, measure) for other in self.points)]
         return tuple(sorted(kept, key=lambda point: point.energy_ratio))
 
-    def rows(self) -> list[dict[str, Any]]:
-        """One dictionary for each point, for tables and files."""
-        return [{"method": self.label, **asdict(point)} for point in self.points]
+    def scaled_of(self, setting: str) -> tuple[Point, ...]:
+        """One setting's motion from none to more than the method's own, by rising gain."""
+        own = [point for point in (*self.points, *self.scaled) if point.setting == setting and point.sharpening == 0]
+        return tuple(sorted(own, key=lambda point: point.gain))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """One dictionary for each point, for files: the point, and what it is among those of the curve."""
+        marks = [(measure, set(self.front(measure)), self.nearest(measure), self.lively(measure)) for measure in MEASURES]
+        for point in (*self.points, *self.scaled):
+            row: dict[str, Any] = {"curve": self.label, **asdict(point)}
+            for measure, front, nearest, lively in marks:
+                row[f"{measure}_front"] = point in front
+                row[f"{measure}_nearest"] = point == nearest
+                row[f"{measure}_lively"] = point == lively
+            yield row
 
 
-def curve(
-    label: str,
-    variants: Mapping[str, Callable[[], Method]],
-    test: Corpus,
-    *,
-    sharpenings: Sequence[float] = SHARPENINGS,
-    seed: int = 0,
-) -> Curve:
-    """Let each variant of a method (setting in words → trained method) speak a test corpus, and measure every sharpening."""
-    points: list[Point] = []
-    for setting, make in variants.items():
-        figures: dict[float, list[Array]] = {share: [] for share in sharpenings}
-        method = make()
-        for utterance in track(test, f"{label}, {setting}", len(test)):
-            made = method.synthesize(utterance.speech, seed=seed)
-            for share in sharpenings:
-                figures[share] += _figures(sharpened(made, share), utterance.motion)
-        points += [Point(setting, share, *np.mean(rows, axis=0).tolist()) for share, rows in figures.items() if rows]
-    return Curve(label, tuple(points))
+def compromises(made: Motion, truth: Motion) -> Array:
+    """[V, 4] of one utterance at each of VARIATIONS: energy ratio, that of the lips, `lve`, `lve_centred`.
+
+    Two sharpened motions tell all: `sharpen` is linear in its share. Speeds, and so both energies, are proportional to
+    the gain. UnavailableError where a figure has no value.
+    """
+    lips = lip_points(truth.layout)
+    lips_truth, frames = _lips(truth, lips), made.frames.astype(np.float64)
+    once, twice = (sharpen(frames, share, made.fps) for share in (1.0, 2.0))
+    mean = frames.mean(axis=0)
+    rows: list[tuple[float, float, float, float]] = []
+    for gain, share in VARIATIONS:
+        changed = frames if share == 0 else once + (share - 1) * (twice - once)
+        variant = replace(made, frames=(mean + gain * (changed - mean) if gain != 1 else changed).astype(np.float32))
+        lips_made = _lips(variant, lips)
+        errors = lve(lips_made, lips_truth), lve_centred(lips_made, lips_truth)
+        if gain == 1:
+            rows.append((energy_ratio(variant, truth), energy_ratio(lips_made, lips_truth), *errors))
+        else:
+            rows.append((gain * rows[0][0], gain * rows[0][1], *errors))
+    return np.array(rows)
 
 
-def efase_variants(
-    model: Efase, temperatures: Iterable[float], audio_weights: Iterable[float] = (), pose_weights: Iterable[float] = ()
-) -> dict[str, Callable[[], Method]]:
-    """A trained eFASE at each temperature, and at its own temperature under each weight of its audio terms."""
-    settings = [{"temperature": value} for value in temperatures]
-    settings += [{"audio_weight": value} for value in audio_weights]
-    settings += [{"pose_weight": value} for value in pose_weights]
-    named = {", ".join(f"{key} {value:g}" for key, value in setting.items()): setting for setting in settings}
-    return {name: lambda setting=setting: model.with_weights(**setting) for name, setting in named.items()}  # type: ignore[misc]
+def mean_points(rows: Sequence[Array]) -> tuple[Point, ...]:
+    """The points of one setting from `compromises` of its utterances; none where there are no utterances."""
+    if not rows:
+        return ()
+    means = np.mean(rows, axis=0)
+    return tuple(Point(*variation, *row) for variation, row in zip(VARIATIONS, means.tolist(), strict=True))
 
 
-def sharpened(motion: Motion, share: float) -> Motion:
-    """The motion with its quick movement raised; see `facesynth.methods.efase.sharpening`."""
-    if share == 0:
-        return motion
-    return replace(motion, frames=sharpen(motion.frames.astype(np.float64), share, motion.fps).astype(np.float32))
+def curves_of(points: Mapping[str, Sequence[Point]], families: Sequence[Family]) -> tuple[Curve, ...]:
+    """From the points of each contestant: one curve for each family that is one method, one for everybody else.
+
+    The second take is no method: a recording needs neither sharpening nor scaling.
+    """
+    together = {family.curve: family.labels for family in families if family.curve}
+    taken = {label for labels in together.values() for label in labels}
+    alone = {label: (label,) for label in points if label not in taken}
+    return tuple(
+        found
+        for name, labels in (together | alone).items()
+        if (found := _curve(name, [(label, points[label]) for label in labels if points.get(label)])).points
+    )
 
 
-def _figures(made: Motion, truth: Motion) -> list[Array]:
-    """The numbers of `Point`, in its order; nothing where an utterance has no motion to compare with."""
-    try:
-        lips = energy_ratio(_lips(made), _lips(truth))
-        return [np.array([lve(made, truth), lve_centred(made, truth), energy_ratio(made, truth), lips])]
-    except UnavailableError:
-        return []
+def _curve(name: str, settings: Sequence[tuple[str, Sequence[Point]]]) -> Curve:
+    named = [replace(point, setting=label) for label, points in settings for point in points]
+    own = tuple(p for p in named if p.gain == 1 and (p.sharpening == 0 or name != SECOND_TAKE))
+    return Curve(name, own, tuple(p for p in named if p.gain != 1 and name != SECOND_TAKE))
 
 
-def _lips(motion: Motion) -> Motion:
+def _lips(motion: Motion, lips: NDArray[np.int64]) -> Motion:
     """The lip points alone."""
-    layout, lips = motion.layout, lip_points(motion.layout)
-    chosen = motion.points[:, lips]
+    layout, chosen = motion.layout, motion.points[:, lips]
     names = tuple(layout.names[int(i)] for i in lips)
-    return Motion(chosen.reshape(len(motion), -1), motion.fps, Layout(layout.kind, names, {}))
+    mouth = Layout(layout.kind, names, {"mouth": tuple(range(len(names)))})
+    return Motion(chosen.reshape(len(motion), -1), motion.fps, mouth)
 
 
-def _beats(one: Point, other: Point) -> bool:
+def _beats(one: Point, other: Point, measure: Measure) -> bool:
     """Whether a point is better in one respect and no worse in the other."""
-    faults = [(point.lve, abs(1 - point.energy_ratio)) for point in (one, other)]
+    faults = [(getattr(point, measure), abs(1 - point.energy_ratio)) for point in (one, other)]
     return faults[0] != faults[1] and all(a <= b for a, b in zip(*faults, strict=True))

@@ -9,16 +9,13 @@ from itertools import pairwise
 import numpy as np
 
 from facesynth.corpus import Utterance
-from facesynth.evaluation import geometry
-from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.curve import Point, compromises, mean_points
 from facesynth.evaluation.pair import Array, UnavailableError, distances, paired_points
 from facesynth.evaluation.regions import lip_points
 from facesynth.evaluation.time_alignment import aligned_distances
 from facesynth.motion.motion import Motion
 from facesynth.speech.phones import SILENCE
 
-GAINS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
-"""Sizes of movement about an utterance's own mean pose at which a method's curve is drawn."""
 BINS = 61
 HISTOGRAM_SPREADS = 3.0
 """The residual histogram reaches so many standard deviations of the recorded lip movement either way."""
@@ -38,16 +35,6 @@ class PhoneError:
     """The same after the frames are matched in time (`aligned_distances`)."""
 
 
-@dataclass(frozen=True)
-class TradePoint:
-    """What a method would score if it moved `gain` times as much about each utterance's mean pose."""
-
-    gain: float
-    energy_ratio: float
-    lve: float
-    lve_centred: float
-
-
 @dataclass(frozen=True, eq=False)
 class Details:
     """Where the error of one method lies."""
@@ -59,7 +46,8 @@ class Details:
     """[BINS] share of the lip residuals (synthesised - recorded, each coordinate) in each bin."""
     histogram_reach: float = 0.0
     """Outer edges of the bins, ± in the unit of the layout; the outer bins hold what lies beyond."""
-    trade: tuple[TradePoint, ...] = ()
+    trade: tuple[Point, ...] = ()
+    """What the method would score with its movement changed, see `compromises`."""
 
 
 def residual_reach(utterances: Iterable[Utterance]) -> float:
@@ -84,7 +72,7 @@ class DetailSums:
         self.phones: dict[str, list[Array]] = {}
         self.points: list[tuple[Array, Array]] = []
         self.histogram = np.zeros(BINS)
-        self.trade: list[list[tuple[float, float, float]]] = []
+        self.trade: list[Array] = []
 
     def add(self, utterance: Utterance, motion: Motion) -> None:
         """Count one utterance."""
@@ -108,7 +96,7 @@ class DetailSums:
         points = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
         counted = self.histogram.sum()
         histogram = self.histogram / counted if counted else self.histogram
-        return Details(self._phone_errors(), points, histogram, self.reach, self._trade())
+        return Details(self._phone_errors(), points, histogram, self.reach, mean_points(self.trade))
 
     def _add_phones(self, utterance: Utterance, errors: Array) -> None:
         bounds = utterance.speech.phones.frame_bounds(utterance.motion.fps)
@@ -125,8 +113,7 @@ class DetailSums:
 
     def _add_trade(self, motion: Motion, truth: Motion) -> None:
         try:
-            energy = energy_ratio(motion, truth)
-            self.trade.append([_trade(motion, truth, gain, energy) for gain in GAINS])
+            self.trade.append(compromises(motion, truth))
         except UnavailableError:
             return
 
@@ -138,12 +125,6 @@ class DetailSums:
         ]
         return tuple(sorted(rows, key=lambda row: (-row.count, row.phone)))
 
-    def _trade(self) -> tuple[TradePoint, ...]:
-        if not self.trade:
-            return ()
-        means = np.mean(self.trade, axis=0)
-        return tuple(TradePoint(gain, *map(float, row)) for gain, row in zip(GAINS, means, strict=True))
-
 
 def overall_aligned(phones: Iterable[PhoneError]) -> Mapping[str, float]:
     """The three errors averaged over everything that is said, each phone as often as it is."""
@@ -151,14 +132,6 @@ def overall_aligned(phones: Iterable[PhoneError]) -> Mapping[str, float]:
     count = sum(row.count for row in rows)
     names = ("marker_error", "lip_error", "aligned_lip_error")
     return {name: sum(getattr(row, name) * row.count for row in rows) / count for name in names} if count else {}
-
-
-def _trade(motion: Motion, truth: Motion, gain: float, energy: float) -> tuple[float, float, float]:
-    """Energy is proportional to the gain: speeds are."""
-    mean = motion.frames.mean(axis=0, dtype=np.float64)
-    frames = (mean + gain * (motion.frames - mean)).astype(np.float32)
-    scaled = motion if gain == 1.0 else Motion(frames, motion.fps, motion.layout)
-    return gain * energy, geometry.lve(scaled, truth), geometry.lve_centred(scaled, truth)
 
 
 def _mean(apart: Array) -> Array:

@@ -14,6 +14,7 @@ from typing import Any
 from facesynth.atomic import write_text
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import Family
+from facesynth.evaluation.curve import Curve
 from facesynth.evaluation.details import Details, overall_aligned
 from facesynth.evaluation.paired import statements
 from facesynth.evaluation.table import Comparison, Score, short_number
@@ -25,7 +26,7 @@ LATEX |= {"^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "²": "$^2$", "
 
 def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) -> None:
     """Everything of the page that is a number, as CSV, JSON and LaTeX."""
-    comparison = result.comparison
+    comparison, curves = result.comparison, result.curves(families)
     texts = {
         "table.md": comparison.markdown(),
         "table.csv": comparison.csv(),
@@ -35,8 +36,8 @@ def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) 
         "phones.csv": phones_csv(result.details),
         "emotions.csv": emotions_csv(comparison, result.main_columns()),
         "points.csv": points_csv(result),
-        "trade.csv": trade_csv(result.details),
-        "report.json": report_json(result, families),
+        "trade.csv": trade_csv(curves),
+        "report.json": report_json(result, families, curves),
     }
     for name, text in texts.items():
         write_text(folder / name, text)
@@ -107,14 +108,13 @@ def points_csv(result: Evaluation) -> str:
     return to_csv([("method", "point", "mean_error"), *lines])
 
 
-def trade_csv(details: Mapping[str, Details]) -> str:
-    """The curves of error against movement."""
-    names = ("gain", "energy_ratio", "lve", "lve_centred")
-    lines = [[label, *(plain(getattr(point, name)) for name in names)] for label, one in details.items() for point in one.trade]
-    return to_csv([("method", *names), *lines])
+def trade_csv(curves: Sequence[Curve]) -> str:
+    """A line for each point of each curve of error against movement."""
+    rows = [row for curve in curves for row in curve.rows()]
+    return to_csv([tuple(rows[0]), *([_cell(value) for value in row.values()] for row in rows)] if rows else [])
 
 
-def report_json(result: Evaluation, families: Sequence[Family]) -> str:
+def report_json(result: Evaluation, families: Sequence[Family], curves: Sequence[Curve]) -> str:
     """Everything, for programs."""
     whole: dict[str, Any] = json.loads(result.comparison.json())
     whole["overall"] = {label: dict(overall_aligned(one.phones)) for label, one in result.details.items()}
@@ -122,6 +122,7 @@ def report_json(result: Evaluation, families: Sequence[Family]) -> str:
     whole["statements"] = dict(statements(result.differences))
     whole["folds"] = [{"train": fold.train, "test": fold.test} for fold in result.folds]
     whole["made_of"] = {label: list(accounts) for label, accounts in result.accounts.items()}
+    whole["curves"] = [row for curve in curves for row in curve.rows()]
     whole["families"] = [vars(family) for family in families]
     return json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 

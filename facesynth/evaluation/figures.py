@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from facesynth.evaluation.details import GAINS, Details
+from facesynth.evaluation.details import Details
 from facesynth.evaluation.emotion_recognition import Confusion
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.point_face import PointFace
@@ -63,28 +63,6 @@ def as_uri(figure: Figure, kind: str = "svg") -> str:
 def data_uri(mime: str, content: bytes) -> str:
     """Any content as `data:` URI."""
     return f"data:{mime};base64,{base64.b64encode(content).decode()}"
-
-
-def trade_figure(details: Mapping[str, Details], references: Sequence[str], unit: str) -> str:
-    """`lve` against `energy_ratio`: a curve of sizes of movement for each method, a point for each reference row."""
-    figure, axes = new_figure(11, 4.2, 1, 2)
-    colours = colour_of(list(details))
-    for axis, name in zip(axes[0], ("lve", "lve_centred"), strict=True):
-        for label, one in details.items():
-            if one.trade:
-                _trade(axis, label, one, name, colours[label], reference=label in references)
-        axis.axvline(1, color="#bbbbbb", linewidth=0.8)
-        axis.set(xlabel="energy ratio (1 = as much movement as recorded)", ylabel=f"{name} ({unit})", xlim=(-0.05, 1.8))
-    figure.legend(*axes[0][1].get_legend_handles_labels(), fontsize=8, frameon=False, loc="outside right upper")
-    return as_uri(figure)
-
-
-def _trade(axis: Axes, label: str, one: Details, name: str, colour: str, *, reference: bool) -> None:
-    energy, error = [p.energy_ratio for p in one.trade], [getattr(p, name) for p in one.trade]
-    here = GAINS.index(1.0)
-    if not reference:
-        axis.plot(energy, error, color=colour, linewidth=1.2, alpha=0.7)
-    axis.plot(energy[here], error[here], "s" if reference else "o", color=colour, label=label, markersize=6)
 
 
 def face_figure(details: Mapping[str, Details], face: PointFace, unit: str) -> str:

@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 import json
-import time
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from facesynth.atomic import write_text
 from facesynth.corpus import Corpus, Utterance
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.contestants import Contestant
-from facesynth.evaluation.cost import MB, peak_memory
-from facesynth.evaluation.folds import Fold, minutes_of, some_minutes
-from facesynth.evaluation.predictions import Beside, read_beside, save_prediction, write_beside
+from facesynth.evaluation.cost import MB, peak_speaking_mb, stopwatch
+from facesynth.evaluation.folds import Fold, minutes_of, some_minutes, some_of
+from facesynth.evaluation.predictions import (
+    Beside,
+    load_prediction,
+    read_beside,
+    sample_path,
+    sample_paths,
+    save_prediction,
+    write_beside,
+)
 from facesynth.evaluation.versions import versions
 from facesynth.methods.method import Method
-from facesynth.methods.registry import load
+from facesynth.methods.registry import create, load
+
+STORED = 2
+"""Version of what is kept with predictions; older ones are made anew."""
+SAMPLES, SAMPLED = 10, 20
+"""A method that draws makes so many motions of each of so many of a fold's utterances."""
+WARM_UTTERANCES = 6
+_warm: set[str] = set()
+"""Methods that this process has trained and heard before."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +71,7 @@ class Job:
     def made_of(self, corpus: Corpus) -> str:
         """sha256 of all that decides the predictions: method, settings, seed, recordings."""
         learned, tested = (corpus.subset(ids).provenance()["sha256"] for ids in (self.learned(corpus), self.fold.test))
-        facts = [self.contestant.plain(), self.seed, learned, tested]
+        facts = [STORED, self.contestant.plain(), self.seed, learned, tested]
         return sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
     def learned(self, corpus: Corpus) -> tuple[str, ...]:
@@ -94,25 +111,37 @@ def _run(job: Job, corpus: Corpus) -> None:
         account |= _train(job, corpus)
         _write(job.account, account)
     method = load(job.model)
-    with peak_memory() as peak:
-        _speak(job, corpus, method)
-    _write(job.account, account | {"peak_mb": peak.mb if peak.mb == peak.mb else None, "done": True})
+    _speak(job, corpus, method)
+    _sample(job, corpus, method)
+    _write(job.account, account | {"peak_mb": _peak_mb(job, corpus), "done": True})
     job.model.unlink()
 
 
 def _train(job: Job, corpus: Corpus) -> dict[str, Any]:
     learned = job.learned(corpus)
+    _warm_up(job, corpus.subset(learned[:WARM_UTTERANCES]))
     method = job.contestant.create()
-    started = time.perf_counter()
-    method.fit(corpus.subset(learned), seed=job.seed)
-    train_s = time.perf_counter() - started
+    with stopwatch() as spent:
+        method.fit(corpus.subset(learned), seed=job.seed)
     method.save(job.model)
     return {
-        "train_s": train_s,
+        "train_s": spent.clock_s,
+        "train_cpu_s": spent.processor_s,
         "train_minutes": minutes_of(corpus, learned),
         "model_mb": job.model.stat().st_size / MB,
         "tested": list(job.fold.test),
     }
+
+
+def _warm_up(job: Job, few: Corpus) -> None:
+    """Whoever comes first pays for what is imported, compiled and opened once a process: learn a little beforehand."""
+    name = job.contestant.method
+    if name in _warm:
+        return
+    _warm.add(name)
+    settings = dict(job.contestant.create().config)
+    with suppress(FacesynthError):  # so little may be too little, and then there is little to warm
+        create(name, **settings | ({"steps": 1} if "steps" in settings else {})).fit(few, seed=job.seed)
 
 
 def _speak(job: Job, corpus: Corpus, method: Method) -> None:
@@ -126,12 +155,32 @@ def _speak(job: Job, corpus: Corpus, method: Method) -> None:
 
 
 def _speak_one(job: Job, method: Method, utterance: Utterance) -> None:
-    started = time.perf_counter()
-    motion = method.synthesize(utterance.speech, seed=job.seed, **job.contestant.speak)
-    synthesis_s = time.perf_counter() - started
+    with stopwatch() as spent:
+        motion = method.synthesize(utterance.speech, seed=job.seed, **job.contestant.speak)
     path = _path(job, utterance.id)
     save_prediction(path, utterance.id, motion)
-    write_beside(path, Beside.of(method, utterance.speech, synthesis_s))
+    write_beside(path, Beside.of(method, utterance.speech, spent))
+
+
+def _sample(job: Job, corpus: Corpus, method: Method) -> None:
+    """Where another seed makes another motion, keep the motions of SAMPLES seeds, of a few utterances."""
+    for utterance_id in some_of(job.fold.test, SAMPLED, job.seed):
+        path, speech = _path(job, utterance_id), corpus[utterance_id].speech
+        if len(sample_paths(path)) == SAMPLES - 1:
+            continue
+        for number in range(1, SAMPLES):
+            motion = method.synthesize(speech, seed=job.seed + number, **job.contestant.speak)
+            if number == 1 and np.array_equal(motion.frames, load_prediction(path)[1].frames):
+                return
+            save_prediction(sample_path(path, number), utterance_id, motion)
+
+
+def _peak_mb(job: Job, corpus: Corpus) -> float | None:
+    """In the first fold, of its longest utterance; others would tell the same."""
+    if job.number > 1:
+        return None
+    longest = max(job.fold.test, key=corpus.duration_s)
+    return peak_speaking_mb(job.model, corpus.path, longest, job.seed, job.contestant.speak)
 
 
 def read_account(path: Path) -> dict[str, Any]:
@@ -150,8 +199,9 @@ def _path(job: Job, utterance_id: str) -> Path:
 def _forget(job: Job, account: dict[str, Any]) -> None:
     """Remove what other settings, recordings or folds left behind, so that nothing of it is taken for new."""
     for utterance_id in {*job.fold.test, *account.get("tested", ())}:
-        for path in (_path(job, utterance_id), _path(job, utterance_id).with_suffix(".json")):
-            path.unlink(missing_ok=True)
+        path = _path(job, utterance_id)
+        for one in (path, path.with_suffix(".json"), *sample_paths(path)):
+            one.unlink(missing_ok=True)
     job.model.unlink(missing_ok=True)
     job.account.unlink(missing_ok=True)
 

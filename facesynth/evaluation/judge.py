@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -102,6 +102,12 @@ class Tally:
         column += [NAN] * (self.count - 1 - len(column)) + [value]
         if reason:
             self.reasons.setdefault(name, reason)
+
+    def explain(self, names: Iterable[str], reason: str) -> None:
+        """Why figures that no utterance has are missing."""
+        for name in names:
+            if name not in self.values:
+                self.reasons.setdefault(name, reason)
 
     def row(self, label: str, costs: Mapping[str, float]) -> Row:
         """The method's row."""

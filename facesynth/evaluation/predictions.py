@@ -11,8 +11,9 @@ One NPZ file per utterance, without pickled objects, called `METHOD/ID.npz`:
 `eyes` (optional)         [T, 3] float32   opening 0..1, gaze to the left and up (rad)
 ========================  ===============  ==================================================
 
-Beside it may lie `METHOD/ID.json`: `synthesis_s` and `speech_s` (the real-time factor), `joins` (first frames of
-the pieces of a concatenative method) and `own` (figures that the method tells of itself).
+Beside it may lie `METHOD/ID.json`: `synthesis_s` and `speech_s` (the real-time factor), `synthesis_cpu_s` (the same by
+the processor), `joins` (first frames of the pieces of a concatenative method) and `own` (figures that the method tells
+of itself). Other motions of a method that draws them lie in `METHOD/samples/NUMBER/ID.npz`, in the same form.
 """
 
 from __future__ import annotations
@@ -28,10 +29,13 @@ import numpy as np
 
 from facesynth.atomic import atomic_path, write_text
 from facesynth.errors import FacesynthError
+from facesynth.evaluation.cost import Spent
 from facesynth.methods.method import Method
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 from facesynth.speech.speech import Speech
+
+SAMPLES = "samples"
 
 
 @runtime_checkable
@@ -57,17 +61,20 @@ class Beside:
     """What is known of a prediction beside its motion."""
 
     synthesis_s: float
+    """By the clock."""
     speech_s: float
     joins: tuple[int, ...] | None = None
     """First frames of the pieces; None for a method that joins none."""
     own: Mapping[str, float] = field(default_factory=dict)
+    synthesis_cpu_s: float | None = None
+    """Of the processor; None where nobody measured it."""
 
     @classmethod
-    def of(cls, method: Method, speech: Speech, synthesis_s: float) -> Self:
+    def of(cls, method: Method, speech: Speech, spent: Spent) -> Self:
         """Ask a method."""
         joins = tuple(map(int, method.joins(speech))) if isinstance(method, Joining) else None
         own = {name: float(value) for name, value in method.report(speech).items()} if isinstance(method, Reporting) else {}
-        return cls(synthesis_s, speech.duration_s, joins, own)
+        return cls(spent.clock_s, speech.duration_s, joins, own, spent.processor_s)
 
 
 def save_prediction(path: str | Path, utterance_id: str, motion: Motion) -> None:
@@ -91,6 +98,17 @@ def load_prediction(path: str | Path, layout: Layout | None = None) -> tuple[str
         raise FacesynthError(f"{path} is no prediction that facesynth can read ({error}); see the form it wants") from None
 
 
+def sample_path(path: Path, number: int) -> Path:
+    """Where another motion of the prediction `path` is kept."""
+    return path.parent / SAMPLES / str(number) / path.name
+
+
+def sample_paths(path: Path) -> list[Path]:
+    """Other motions of the prediction `path`, in the order of their folders' names."""
+    folders = sorted(folder for folder in (path.parent / SAMPLES).glob("*") if folder.is_dir())
+    return [folder / path.name for folder in folders if (folder / path.name).is_file()]
+
+
 def write_beside(path: Path, beside: Beside) -> None:
     """Write the JSON beside the prediction `path`, atomically."""
     write_text(path.with_suffix(".json"), json.dumps(asdict(beside), allow_nan=False) + "\n")
@@ -105,8 +123,13 @@ def read_beside(path: Path) -> Beside | None:
         plain = json.loads(beside.read_text(encoding="utf-8"))
         joins = plain.get("joins")
         own = {str(name): float(value) for name, value in plain.get("own", {}).items()}
+        processor_s = plain.get("synthesis_cpu_s")
         return Beside(
-            float(plain["synthesis_s"]), float(plain["speech_s"]), None if joins is None else tuple(map(int, joins)), own
+            float(plain["synthesis_s"]),
+            float(plain["speech_s"]),
+            None if joins is None else tuple(map(int, joins)),
+            own,
+            None if processor_s is None else float(processor_s),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FacesynthError(f"{beside} tells nothing of a prediction ({error}); remove it, or see the form it wants") from None

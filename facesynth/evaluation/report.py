@@ -18,6 +18,8 @@ from facesynth.errors import FacesynthError
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Family
+from facesynth.evaluation.curve import LIVELY, MEASURES
+from facesynth.evaluation.curve_figure import curve_figure
 from facesynth.evaluation.exports import best_labels, write_exports
 from facesynth.evaluation.face_video import worst_shown, write_side_by_side
 from facesynth.evaluation.family_figure import family_figure
@@ -26,7 +28,7 @@ from facesynth.evaluation.pair import Array
 from facesynth.evaluation.paired import statements
 from facesynth.evaluation.point_face import PointFace
 from facesynth.evaluation.table import ARROWS, Comparison
-from facesynth.evaluation.tallies import read_pair
+from facesynth.evaluation.tallies import read_motion
 from facesynth.evaluation.trajectories import MOST_SHOWN, trajectory_figure
 from facesynth.evaluation.verdict import verdicts
 from facesynth.motion.motion import Motion
@@ -89,7 +91,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "differences": result.differences,
         "emotions": _by_emotion(comparison, result.main_columns()),
         "phones": _phones(result),
-        "trade": figures.trade_figure(result.details, (*REFERENCES, SECOND_TAKE), unit),
+        **_curves(result, families, unit),
         "face": figures.face_figure(result.details, face, unit),
         "histograms": figures.histogram_figure(result.details, unit),
         "confusions": figures.confusion_figure(matrices),
@@ -125,6 +127,18 @@ def _by_emotion(comparison: Comparison, columns: Sequence[str]) -> dict[str, dic
     return {emotion: table(comparison.of_emotion(emotion), quality) for emotion in found}
 
 
+def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[str, Any]:
+    """The picture of all curves, and for each curve the nearest and the best lively point by both errors.
+
+    Variants of a family that is no single method have a picture of their own, and would only crowd this one.
+    """
+    crowd = {label for family in families if not family.curve for label in family.labels}
+    curves = [curve for curve in result.curves(families) if curve.label not in crowd]
+    references = (*REFERENCES, SECOND_TAKE)
+    rows = [(curve.label, [best for m in MEASURES for best in ((m, curve.nearest(m)), (m, curve.lively(m)))]) for curve in curves]
+    return {"trade": curve_figure(curves, references, unit) if curves else "", "curves": rows, "lively": LIVELY}
+
+
 def _phones(result: Evaluation) -> dict[str, Any]:
     """For each phone its count, and for each method the lip error before and after alignment in time."""
     rows: dict[str, dict[str, tuple[float, float]]] = {}
@@ -145,9 +159,8 @@ def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish) -> I
     order = sorted(labels, key=lambda label: SHOWN_LAST.index(label) if label in SHOWN_LAST else -1)
     worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
     for utterance_id in track(wish.shown or typical(result), "pictures"):
-        pairs = {label: pair for label in order if (pair := read_pair(corpus, result.predictions, label, utterance_id))}
         utterance = corpus[utterance_id]
-        motions = {label: pair[1] for label, pair in pairs.items()}
+        motions = {label: made for label in order if (made := read_motion(corpus, result.predictions, label, utterance_id))}
         drawn = {label: motions[label] for label in labels if label in islice(motions, MOST_SHOWN)}
         yield {
             "id": utterance_id,

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.errors import FacesynthError
+from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.details import Details, DetailSums
 from facesynth.evaluation.dynamics import join_jump
 from facesynth.evaluation.judge import NAN, Judge, Tally
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.evaluation.predictions import Beside, load_prediction, read_beside
+from facesynth.evaluation.predictions import Beside, load_prediction, read_beside, sample_paths
+from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Row
+from facesynth.evaluation.variety import VARIETY
 from facesynth.motion.motion import Motion
 
 
@@ -22,6 +25,8 @@ class Task:
     """One method to judge."""
 
     corpus: Path
+    known: tuple[str, ...]
+    """Utterances of the corpus that there are: those left out are no second takes either."""
     predictions: Path
     label: str
     tested: tuple[str, ...]
@@ -42,28 +47,34 @@ class Judged:
 
 def tally(task: Task) -> Judged:
     """Every figure of every tested utterance; an utterance without a prediction has none, and the reason says so."""
-    corpus, folder = Corpus.open(task.corpus), task.predictions / task.label
+    corpus, spent = Corpus.open(task.corpus).subset(task.known), list[Beside]()
     figures, sums = Tally(), DetailSums(task.reach)
-    synthesis_s = speech_s = 0.0
     for utterance_id in task.tested:
-        path = folder / f"{utterance_id}.npz"
-        if not path.is_file():
+        motion = read_motion(corpus, task.predictions, task.label, utterance_id)
+        if motion is None:
             figures.miss(f"{task.label} has no prediction of some utterances")
             continue
-        utterance, motion = corpus[utterance_id], _motion(path, utterance_id, corpus)
+        utterance = corpus[utterance_id]
         figures.add(task.judges[utterance_id], utterance, motion)
         sums.add(utterance, motion)
+        if task.label == SECOND_TAKE:
+            continue
+        path = task.predictions / task.label / f"{utterance_id}.npz"
+        _add_variety(figures, path, motion, utterance, corpus)
         if beside := read_beside(path):
             _add_own(figures, beside, motion)
-            synthesis_s, speech_s = synthesis_s + beside.synthesis_s, speech_s + beside.speech_s
-    costs = {"rtf": synthesis_s / speech_s} if speech_s else {}
-    return Judged(figures.row(task.label, {}), sums.details(), costs)
+            spent.append(beside)
+    figures.explain(VARIETY, "no other motion of the same speech: the method draws none, or none lies beside the predictions")
+    return Judged(figures.row(task.label, {}), sums.details(), _rates(spent))
 
 
-def read_pair(corpus: Corpus, predictions: Path, label: str, utterance_id: str) -> tuple[Utterance, Motion] | None:
-    """An utterance and a method's prediction of it; None where there is none."""
+def read_motion(corpus: Corpus, predictions: Path, label: str, utterance_id: str) -> Motion | None:
+    """A method's stored prediction of an utterance, or its second take; None where there is none."""
+    if label == SECOND_TAKE:
+        take = second_take(corpus, utterance_id)
+        return retimed(take, corpus[utterance_id].speech.phones) if take else None
     path = predictions / label / f"{utterance_id}.npz"
-    return (corpus[utterance_id], _motion(path, utterance_id, corpus)) if path.is_file() else None
+    return _motion(path, utterance_id, corpus) if path.is_file() else None
 
 
 def _motion(path: Path, utterance_id: str, corpus: Corpus) -> Motion:
@@ -80,6 +91,25 @@ def refuse_strangers(corpus: Corpus, folder: Path) -> None:
             raise FacesynthError(
                 f"{path}: the corpus has no utterance {path.stem!r}; predictions are called METHOD/UTTERANCE.npz"
             )
+
+
+def _rates(spent: Sequence[Beside]) -> dict[str, float]:
+    """Real-time factors by the clock and by the processor, as far as they are known."""
+    speech_s = sum(one.speech_s for one in spent)
+    processor_s = [one.synthesis_cpu_s for one in spent if one.synthesis_cpu_s is not None]
+    found = {"rtf": sum(one.synthesis_s for one in spent) / speech_s} if speech_s else {}
+    return found | ({"rtf_cpu": sum(processor_s) / speech_s} if speech_s and len(processor_s) == len(spent) else {})
+
+
+def _add_variety(figures: Tally, path: Path, motion: Motion, utterance: Utterance, corpus: Corpus) -> None:
+    samples = [motion, *(_motion(one, utterance.id, corpus) for one in sample_paths(path))]
+    if len(samples) < 2:
+        return
+    for name in VARIETY:
+        try:
+            figures.set(name, VARIETY[name](samples, utterance.motion))
+        except UnavailableError as reason:
+            figures.set(name, NAN, str(reason))
 
 
 def _add_own(figures: Tally, beside: Beside, motion: Motion) -> None:

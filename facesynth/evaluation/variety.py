@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -31,3 +31,11 @@ def error_of_mean(samples: Sequence[Motion], truth: Motion) -> float:
 def error_of_best(samples: Sequence[Motion], truth: Motion) -> float:
     """`marker_error` (unit of the layout) of the sample that is nearest to the truth."""
     return min(marker_error(sample, truth) for sample in samples)
+
+
+VARIETY: Mapping[str, Callable[[Sequence[Motion], Motion], float]] = {
+    "diversity": lambda samples, truth: diversity(samples),
+    "error_of_mean": error_of_mean,
+    "error_of_best": error_of_best,
+}
+"""By figure: what it is of samples and truth."""

@@ -51,7 +51,7 @@ def _verdict(result: Evaluation, label: str) -> Verdict:
 
 def reason(result: Evaluation, label: str) -> str:
     """Which part of the lip error is movement and which the pose held, from the curve of sizes of movement."""
-    trade = result.details[label].trade
+    trade = sorted((p for p in result.details[label].trade if p.sharpening == 0), key=lambda point: point.gain)
     if not trade:
         return "The layout does not tell lip error by size of movement."
     whole = next(point for point in trade if point.gain == 1.0)

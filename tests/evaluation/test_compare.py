@@ -20,7 +20,7 @@ from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
-CLOCKS = ("train_s", "rtf", "peak_mb")
+CLOCKS = ("train_s", "train_cpu_s", "rtf", "rtf_cpu")
 
 
 @register("telling")
@@ -32,6 +32,17 @@ class Telling(PhoneMean):
 
     def joins(self, speech):
         return speech.phones.frame_bounds(self.fps)[1:-1]
+
+
+@register("drawing")
+class Drawing(MeanFace):
+    """A method that draws where it holds the face: the first channel lies off by a normal number of 2 units."""
+
+    def synthesize(self, speech, *, seed=0, **options):
+        motion = super().synthesize(speech)
+        frames = motion.frames.copy()
+        frames[:, 0] += 2 * np.random.default_rng(seed).normal()
+        return Motion(frames, motion.fps, motion.layout)
 
 
 @register("short")
@@ -91,15 +102,14 @@ def test_a_second_take_counts_only_where_there_is_one(result, corpus, tmp_path):
     takes = [r for r in corpus.records if r.take == 2]
     assert result.comparison.scores[SECOND_TAKE]["lve"].utterances == 2 * len(takes)
     alone = corpus.subset([i for i in corpus.ids if i.endswith("t1")])
-    stale = tmp_path / "predictions" / SECOND_TAKE / f"{alone.ids[0]}.npz"
-    save_prediction(stale, alone.ids[0], alone[alone.ids[0]].motion)
     evaluation = evaluate(QUICK[:1], alone, make_folds(alone, 2), tmp_path)
     assert "not available" in evaluation.comparison.markdown()
-    assert not stale.exists()
 
 
 def test_figures_can_be_computed_again_from_what_was_kept(result, corpus, folds, folder):
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     again = judge_predictions(corpus, folds_beside(folder / "predictions", corpus), folder / "predictions")
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before  # nothing is written into what is given
     assert again.folds == folds
     for label in result.comparison.scores:
         assert figures(again, label) == figures(result, label)
@@ -120,13 +130,41 @@ def test_a_method_s_own_figures_become_columns(result):
 def test_costs_and_what_it_was_made_of_are_kept(result):
     costs = next(row for row in result.comparison.rows if row.label == "ridge").costs
     assert costs["train_s"] > 0
+    assert costs["train_cpu_s"] > 0
     assert 0 < costs["rtf"] < 1
+    assert 0 < costs["rtf_cpu"] < 1
+    assert costs["peak_mb"] == 123
     assert costs["model_mb"] > 0.01
     account = result.accounts["ridge"][0]
     assert account["done"]
     assert len(account["made_of"]) == len(account["versions"]["source"]) == 64
     assert account["contestant"]["method"] == "ridge"
     assert result.comparison.provenance["corpus"]["sha256"]
+
+
+def test_who_comes_first_pays_for_nothing(corpus, folds, tmp_path, monkeypatch):
+    learned = []
+    monkeypatch.setattr(jobs, "_warm", set())
+    fit = PhoneMean.fit
+    monkeypatch.setattr(PhoneMean, "fit", lambda self, some, *, seed=0: learned.append(len(some)) or fit(self, some, seed=seed))
+    evaluate([Contestant(name, "phone_mean") for name in ("one", "two")], corpus, folds[:1], tmp_path)
+    assert learned == [jobs.WARM_UTTERANCES, len(folds[0].train), len(folds[0].train)]
+
+
+def test_a_method_that_draws_is_judged_by_several_motions(result, corpus, folds, tmp_path):
+    evaluation = evaluate([Contestant("drawing", "drawing")], corpus, folds, tmp_path)
+    scores = evaluation.comparison.scores["drawing"]
+    assert scores["diversity"].utterances == len(corpus)
+    offsets = 2 * np.array([np.random.default_rng(seed).normal() for seed in range(jobs.SAMPLES)])
+    apart = np.abs(offsets[:, None] - offsets)[np.triu_indices(len(offsets), 1)].mean()
+    points = corpus.layout.channels // corpus.layout.dimension
+    assert scores["diversity"].mean == pytest.approx(apart / points, rel=1e-3)
+    assert scores["error_of_best"].mean <= scores["error_of_mean"].mean + 1e-6
+    assert scores["error_of_best"].mean <= scores["marker_error"].mean
+    assert result.comparison.scores["ridge"]["diversity"].utterances == 0
+    assert "the method draws none" in result.comparison.markdown(["diversity"])
+    again = judge_predictions(corpus, folds, tmp_path / "predictions")
+    assert figures(again, "drawing") == figures(evaluation, "drawing")
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from talking_points import moved, talk
 
 from facesynth.errors import FacesynthError
 from facesynth.evaluation import variety
-from facesynth.evaluation.cost import peak_memory
 from facesynth.evaluation.head import head_cca, head_distance
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.motion.motion import Motion
@@ -68,13 +67,3 @@ def test_diversity_of_known_offsets_and_errors_of_the_mean_and_the_best():
     assert variety.error_of_best(samples, truth) == pytest.approx(1, rel=1e-4)
     with pytest.raises(FacesynthError, match="two samples"):
         variety.diversity(samples[:1])
-
-
-def test_peak_memory_sees_a_large_array_that_is_gone_again():
-    with peak_memory() as small:
-        pass
-    with peak_memory() as large:
-        np.ones(40_000_000 // 8)
-    if np.isnan(small.mb):
-        pytest.skip("this system does not tell a process its peak memory")
-    assert large.mb - small.mb > 30

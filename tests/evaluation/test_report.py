@@ -23,6 +23,7 @@ from facesynth.motion.motion import Motion
 
 FILES = "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv report.json"
 FAMILY = Family("By minutes", ("phone mean", "little"), "minutes", (9.0, 0.05))
+CURVE = Family("By what it holds", ("mean face", "wrong"), curve="still faces")
 
 
 @register("wrong_face")
@@ -60,7 +61,9 @@ def result(corpus, folder):
 
 @pytest.fixture(scope="module")
 def page(corpus, folder, result):
-    return write_report(folder, result, corpus, [FAMILY], Wish("Tiny & <small>", corpus.ids[:1])).read_text(encoding="utf-8")
+    return write_report(folder, result, corpus, [FAMILY, CURVE], Wish("Tiny & <small>", corpus.ids[:1])).read_text(
+        encoding="utf-8"
+    )
 
 
 def test_the_page_needs_nothing_but_itself(page):
@@ -78,6 +81,16 @@ def test_every_part_is_there(page):
         assert f'id="{part}"' in page
     assert page.count("data:video/mp4;base64,") == 1
     assert page.count("data:image/svg+xml;base64,") >= 5
+
+
+def test_variants_of_one_method_are_one_curve(folder, page):
+    rows = list(csv.DictReader(io.StringIO((folder / "trade.csv").read_text())))
+    assert {row["curve"] for row in rows} == {"second take", "phone mean", "little", "still faces"}
+    assert {row["setting"] for row in rows if row["curve"] == "still faces"} == {"mean face", "wrong"}
+    nearest = [row for row in rows if row["curve"] == "still faces" and row["lve_nearest"] == "yes"]
+    assert nearest[0]["setting"] == "mean face"
+    assert float(nearest[0]["lve"]) == min(float(row["lve"]) for row in rows if row["curve"] == "still faces")
+    assert "least lve at energy 0.9 to 1.1" in page
 
 
 def test_a_method_that_loses_to_the_mean_face_is_named_with_the_reason(result, page):
@@ -118,7 +131,7 @@ def test_the_latex_table_balances_and_escapes(folder, result):
 
 
 def test_the_same_result_gives_the_same_page(corpus, folder, result, page, tmp_path):
-    write_report(tmp_path, result, corpus, [FAMILY], Wish("Tiny & <small>", corpus.ids[:1]))
+    write_report(tmp_path, result, corpus, [FAMILY, CURVE], Wish("Tiny & <small>", corpus.ids[:1]))
     assert (tmp_path / PAGE).read_text(encoding="utf-8") == page
 
 
