@@ -1,6 +1,9 @@
 """Build an anime graph from a corpus, speak its held-out sentences, judge its emotion maps, save the model.
 
 python train/anime_graph.py CORPUS -o anime_graph.safetensors [--maps 20] [--config configs/anime_graph.yaml] [variance=0.98 …]
+
+learn=true (as in configs/anime_graph_soft.yaml) learns the weights of the cost and how much to sharpen by gradient through
+the mean over paths, on sentences of CORPUS that are kept out of the graph meanwhile; those held out here play no part.
 """
 
 import argparse
@@ -33,6 +36,9 @@ def main() -> None:
 
     # fit
     model = AnimeGraph.from_config(settings).fit(learn, seed=options.seed)
+    if told := model.facts.get("learned"):
+        print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
+        print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))
     print(f"{len(learn)} utterances, {len(model.graph)} nodes, {model.components.count} components")
     for row, cutoff_hz in zip(model.facts["components"], model.cutoffs_hz.tolist(), strict=False):
         print(f"  component {row['component']:2d} ({row['block']}): {row['is']}, emotion ratio {row['emotion_ratio']:.2f}, "

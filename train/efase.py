@@ -2,8 +2,9 @@
 
 python train/efase.py CORPUS -o efase.safetensors [--config configs/efase.yaml] [penalty=3 …]
 
-learn=true with configs/efase_soft.yaml learns the weights of the cost and a linear audio metric by gradient through the
-soft search, on sentences that are neither in its database nor tested on, before the model is fitted to all of them.
+learn=true (as in configs/efase_soft.yaml) learns the weights of the cost, a linear metric of sound and pose, and how
+much to sharpen by gradient through the soft search, on sentences of CORPUS that are kept out of the database meanwhile;
+what is printed at the end comes from sentences that played no part in any of it.
 """
 
 import argparse
@@ -13,7 +14,6 @@ from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, marker_error
-from facesynth.methods.efase.learning import apply, learn
 from facesynth.methods.efase.method import Efase
 
 
@@ -31,18 +31,11 @@ def main() -> None:
     recorded, held_out = corpus.split(options.seed)
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
-    # learn
-    wanted = settings.pop("learn", False)
-    learned = learn(recorded, settings, seed=options.seed) if wanted else None
-    if learned:
-        settings |= learned.settings
-        print(f"learned in {len(learned.errors) - 1} rounds, validation error {learned.improvement:.1%} less")
-        print(" ".join(f"{name}={value:.4g}" for name, value in learned.settings.items()))
-
     # fit
     model = Efase.from_config(settings).fit(recorded, seed=options.seed)
-    if learned:
-        apply(learned, model)
+    if told := model.facts.get("learned"):
+        print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
+        print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))
     print(f"{len(recorded)} utterances, {len(model.facts['names'])} nodes, {model.facts['unusable_phones']} phones unusable")
 
     # evaluate

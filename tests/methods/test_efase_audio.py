@@ -2,22 +2,25 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from corpora import tiny_corpus
+from scipy.ndimage import gaussian_filter1d
 
 from facesynth.config import load_config
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
-from facesynth.methods.efase import learning, prediction
+from facesynth.methods.efase import descent, prediction
 from facesynth.methods.efase.audio import sound_distances
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
-from facesynth.methods.efase.learning import _Parameters, apply, lattices_of, learn, mean_error
+from facesynth.methods.efase.descent import Logs, descend
+from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.sharpening import sharpen
+from facesynth.methods.efase.sharpening import matching_share, sharpen
 from facesynth.methods.registry import load
 
 
@@ -130,26 +133,60 @@ def test_sharpening_adds_motion_and_leaves_a_held_pose(hearing, halves, speech):
 
 
 def test_the_gradient_of_the_error_is_that_of_small_steps(hearing, halves):
-    lattices = lattices_of(hearing, next(iter(halves[1])))
-    parameters = _Parameters(hearing)
-
-    def error():
-        return mean_error(lattices, parameters.values(), parameters.sound, parameters.pose)
-
-    error().backward()
-    for leaf, place in ((parameters.numbers, 2), (parameters.numbers, 8), (parameters.sound, 0), (parameters.pose, 0)):
+    lattices, logs = lattices_of(hearing, next(iter(halves[1]))), logs_of(hearing)
+    mean_error(lattices, logs).backward()
+    moved = [(logs.numbers, place) for place in np.flatnonzero(logs.used)]
+    moved += [(logs.factors["sound"], 0), (logs.factors["sound"], 3), (logs.factors["pose"], 0), (logs.factors["pose"], 1)]
+    for leaf, place in moved:
         slopes = []
         for step in (1e-4, -1e-4):
             with torch.no_grad():
                 leaf[place] += step
-                slopes.append(float(error()))
+                slopes.append(float(mean_error(lattices, logs)))
                 leaf[place] -= step
         assert float(leaf.grad[place]) == pytest.approx((slopes[0] - slopes[1]) / 2e-4, rel=1e-3, abs=1e-8)
 
 
+def test_a_move_away_from_the_start_costs():
+    def error_of(examples, logs):
+        return torch.stack([(logs.values()["size"] - wanted) ** 2 for wanted in examples]).mean()
+
+    found = {}
+    for pull in (0.0, 0.1, 10.0):
+        logs = Logs({"size": 1.0, "none": 0.0}, {"factors": 2})
+        errors = descend(logs, error_of, [3.0] * 8, [3.0], seed=0, rounds=60, pull=pull)
+        assert min(errors) == pytest.approx((logs.found()["size"] - 3) ** 2)
+        found[pull] = logs.found()["size"]
+        assert logs.found()["none"] == 0
+    assert found[0.0] == pytest.approx(3, abs=0.2)
+    assert found[0.0] > found[0.1] > found[10.0] > 1
+
+
+def test_learning_stops_where_unknown_examples_get_worse():
+    def error_of(examples, logs):
+        return torch.stack([(logs.values()["size"] - wanted) ** 2 + 0.01 for wanted in examples]).mean()
+
+    logs = Logs({"size": 1.0}, {})
+    errors = descend(logs, error_of, [3.0] * 8, [1.2], seed=0, rounds=60, pull=0.0)
+    assert len(errors) < 30
+    assert logs.found()["size"] == pytest.approx(1.2, abs=0.06)
+
+
+def test_the_parts_share_no_sentence(halves):
+    corpus = halves[0]
+    key = {record.id: record.sentence_key for record in corpus.usable_records}
+    parts = [{key[i] for i in part.ids} for part in descent.three_parts(corpus, 3)]
+    assert sum(map(len, parts)) == len(set.union(*parts)) == len(set(key.values()))
+    again = descent.three_parts(corpus, 3)
+    assert [part.ids for part in again] == [part.ids for part in descent.three_parts(corpus, 3)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(descent, "MOST", 1)
+        assert [len({key[i] for i in part.ids}) for part in descent.three_parts(corpus, 3)][1:] == [1, 1]
+
+
 @pytest.fixture(scope="module")
 def learned(halves):
-    settings = {"audio_weight": 0.2, "temperature": 2.0, "candidates": 20}
+    settings = {"audio_weight": 0.2, "temperature": 2.0, "candidates": 20, "sharpening": 0.5}
     return settings, learn(halves[0], settings, seed=0, rounds=3)
 
 
@@ -161,16 +198,36 @@ def test_learning_does_not_make_the_held_out_error_larger_and_repeats(halves, le
     assert learn(halves[0], settings, seed=0, rounds=3) == found
 
 
-def test_what_was_learned_goes_into_a_model(halves, learned, tmp_path):
-    settings, found = learned
-    model = Efase.from_config({**settings, **found.settings}).fit(halves[0])
-    before = model.audio.sound.nodes.clone()
-    apply(found, model)
-    torch.testing.assert_close(model.audio.sound.nodes, before * torch.tensor(found.sound_metric).sqrt())
+def test_fitting_learns_from_its_own_corpus_alone_and_keeps_what_it_found(halves, tmp_path):
+    settings = {"audio_weight": 0.2, "temperature": 2.0, "candidates": 20}
+    wanted = learn(halves[0], settings, seed=4)
+    model = Efase(**settings, learn=True).fit(halves[0], seed=4)
+    assert {name: model.config[name] for name in wanted.settings} == wanted.settings
+    assert model.facts["learned"]["improvement"] == wanted.improvement
+    plain = Efase(**{**settings, **wanted.settings}).fit(halves[0], seed=4)
+    torch.testing.assert_close(model.audio.sound.nodes, plain.audio.sound.nodes * torch.tensor(wanted.sound_metric).sqrt())
     model.save(tmp_path / "learned.safetensors")
     utterance = next(iter(halves[1]))
     made = load(tmp_path / "learned.safetensors").synthesize(utterance.speech)
+    assert made.frames.tobytes() == model.synthesize(utterance.speech).frames.tobytes()
     assert np.isfinite(marker_error(made, utterance.motion))
+
+
+def test_the_sharpening_that_recordings_ask_for_is_found(halves):
+    truth = next(iter(halves[1])).motion
+    slow = replace(truth, frames=gaussian_filter1d(truth.frames, 0.05 * truth.fps, axis=0))
+    assert matching_share([(truth, truth)]) == 0
+    share = matching_share([(slow, truth)])
+    assert 0 < share < 2
+    for other, direction in ((share + 0.2, 1), (max(share - 0.2, 0), -1)):
+        moves = [np.abs(np.diff(sharpen(slow.frames.astype(float), s, truth.fps), axis=0)).mean() for s in (other, share)]
+        assert np.sign(moves[0] - moves[1]) == direction
+    raised = replace(slow, frames=sharpen(slow.frames.astype(float), share, truth.fps).astype(np.float32))
+    assert matching_share([(raised, truth)]) < 0.5 * share
+    noisy = replace(truth, frames=truth.frames + np.random.default_rng(0).normal(0, 0.02, truth.frames.shape).astype(np.float32))
+    assert matching_share([(slow, noisy)]) == pytest.approx(share, abs=0.1)
+    gap = replace(truth, frames=np.where(np.arange(len(truth.frames))[:, None] < 5, np.float32(np.nan), truth.frames))
+    assert matching_share([(slow, gap)]) == pytest.approx(share, abs=0.2)
 
 
 def test_learning_refuses_what_it_cannot_learn_from(halves):
@@ -178,23 +235,32 @@ def test_learning_refuses_what_it_cannot_learn_from(halves):
         learn(halves[0], {})
     with pytest.raises(FacesynthError, match="at least 10"):
         learn(halves[0].subset(halves[0].ids[:3]), {"temperature": 1.0})
-    shares = learning.DATABASE_SHARE, learning.LEARN_SHARE
-    assert sum(shares) < 1
 
 
 def test_the_shipped_soft_settings_are_settings_of_efase(repository):
     config = Efase.from_config(load_config(repository / "configs" / "efase_soft.yaml")).config
     assert config["temperature"] > 0
     assert config["pose_weight"] > 0
+    assert config["learn"]
 
 
-def test_the_training_script_learns_weights(tmp_path, repository):
-    corpus = tiny_corpus(tmp_path / "actor", utterances=40, fps=60)
+@pytest.mark.parametrize(("script", "method"), [("efase.py", "efase"), ("anime_graph.py", "anime_graph")])
+def test_the_training_scripts_learn_weights(script, method, tmp_path, repository):
+    corpus = tiny_corpus(tmp_path / "actor", utterances=24, fps=60)
     model = tmp_path / "learned.safetensors"
-    command = [sys.executable, str(repository / "train" / "efase.py"), str(corpus.path), "-o", str(model)]
-    command += ["learn=true", "temperature=1", "audio_weight=0.3", "candidates=10"]
+    command = [sys.executable, str(repository / "train" / script), str(corpus.path), "-o", str(model)]
+    command += [
+        "learn=true",
+        "temperature=1",
+        "audio_weight=0.3",
+        "sharpening=0.5",
+        *(["candidates=10"] if method == "efase" else []),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "validation error" in done.stdout
-    assert "penalty=" in done.stdout
-    assert load(model).config["temperature"] > 0
+    assert "audio_weight=" in done.stdout
+    found = load(model).config
+    assert found["audio_weight"] != 0.3
+    assert found["sharpening"] != 0.5
+    assert f"audio_weight={found['audio_weight']:.4g}" in done.stdout

@@ -98,6 +98,36 @@ def test_cold_it_is_the_cheapest_path():
             assert min(m.shares.max() for m in found) > 1 - 1e-9
 
 
+def test_cold_it_finds_the_path_of_the_exact_search_without_being_told():
+    rng = np.random.default_rng(12)
+    for pnt in (0.3, 3.0, 100.0):
+        for _ in range(5):
+            nodes, weights = random_nodes(rng), Weights(pnt)
+            query = replace(random_query(rng, nodes, 7), heard=rng.exponential(pnt, (7, len(nodes))))  # no ties
+            exact = search(build_index(nodes, weights), query)
+            targets = all_targets(nodes, query, weights)
+            found = soft_search(nodes, query, targets, weights, targets.argmin(axis=1), 1e-7, len(nodes))
+            assert [m.nodes[m.shares.argmax()] for m in found] == list(exact.nodes)
+            assert min(m.shares.max() for m in found) > 1 - 1e-9
+
+
+def test_its_free_energy_is_the_sum_over_all_paths_and_falls_to_the_least_cost():
+    rng = np.random.default_rng(13)
+    for _ in range(5):
+        nodes, weights = random_nodes(rng, 6, sentence=3), Weights(3.0)
+        query = replace(random_query(rng, nodes, 4), heard=rng.exponential(3.0, (4, 6)))
+        targets = [torch.from_numpy(row) for row in all_targets(nodes, query, weights)]
+        costs = CostWeights(weights.pnt, weights.alpha, weights.beta, weights.eta)
+        steps = [step_terms(nodes, np.arange(6), np.arange(6)).cost(costs)] * 3
+        every = np.array([path_cost(nodes, query, np.array(path), weights) for path in product(range(6), repeat=4)])
+        energies = []
+        for temperature in (0.01, 0.5, 5.0):
+            energies.append(-temperature * float(posterior(targets, steps, temperature).log_z))
+            assert energies[-1] == pytest.approx(-temperature * np.logaddexp.reduce(-every / temperature), abs=1e-9)
+        assert energies[0] > energies[1] > energies[2]
+        assert energies[0] == pytest.approx(every.min(), abs=0.01 * np.log(len(every)))
+
+
 def test_hot_every_candidate_is_alike():
     rng = np.random.default_rng(2)
     nodes, weights = random_nodes(rng, 20), Weights(1.0)

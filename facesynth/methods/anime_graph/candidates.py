@@ -12,6 +12,7 @@ from facesynth.methods.anime_graph.audio_cost import audio_costs
 from facesynth.methods.anime_graph.graph import Graph
 from facesynth.methods.anime_graph.maps import EmotionMaps
 from facesynth.methods.anime_graph.search import Step
+from facesynth.methods.efase.steps import stretched
 
 AS_RECORDED = -1
 """In place of the number of a map: the node's motion stays as it is."""
@@ -80,8 +81,12 @@ def make_step(
     before: Candidates | None,
     wanted: NDArray[np.float64],
     metric: NDArray[np.float64],
+    expected: NDArray[np.float64] | None = None,
 ) -> Step:
-    """What the search needs to know of candidates: audio cost against wanted [m, P], end frames, captured links."""
+    """What the search needs to know of candidates: audio cost against wanted [m, P], end frames, captured links.
+
+    expected: [frames, D] the pose that the sound leads one to expect, as components times metric.
+    """
     graph, nodes = chooser.graph, candidates.nodes
     first, last = graph.frames[graph.starts[nodes]], graph.frames[graph.stops[nodes] - 1]
     for number in np.unique(candidates.maps[candidates.maps != AS_RECORDED]):
@@ -89,7 +94,27 @@ def make_step(
         first[through] = chooser.maps.apply_array(first[through], int(number))
         last[through] = chooser.maps.apply_array(last[through], int(number))
     audio = audio_costs(wanted, graph.features, graph.feature_starts[nodes], graph.feature_stops[nodes])
-    return Step(audio, first @ metric, last @ metric, _links(graph, candidates, before))
+    pose = None if expected is None else pose_costs(chooser, candidates, expected, metric)
+    return Step(audio, first @ metric, last @ metric, _links(graph, candidates, before), pose)
+
+
+def pose_costs(
+    chooser: Chooser, candidates: Candidates, expected: NDArray[np.float64], metric: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """[n] mean over the frames of ‖candidate - expected‖², each candidate stretched evenly to them; see `make_step`."""
+    if not len(expected):
+        return np.zeros(len(candidates.nodes))
+    return ((stretched_motions(chooser, candidates, len(expected)) @ metric - expected) ** 2).sum(axis=2).mean(axis=1)
+
+
+def stretched_motions(chooser: Chooser, candidates: Candidates, count: int) -> NDArray[np.float64]:
+    """[n, count, D] the motion of every candidate, through its map, stretched evenly to `count` frames."""
+    motions = stretched(chooser.graph, candidates.nodes, count)
+    for number in np.unique(candidates.maps[candidates.maps != AS_RECORDED]):
+        through = candidates.maps == number
+        flat = motions[through].reshape(-1, motions.shape[2])
+        motions[through] = chooser.maps.apply_array(flat, int(number)).reshape(-1, count, motions.shape[2])
+    return motions
 
 
 def _links(graph: Graph, candidates: Candidates, before: Candidates | None) -> NDArray[np.int64]:

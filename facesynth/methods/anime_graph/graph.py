@@ -51,6 +51,11 @@ class Graph:
     def __len__(self) -> int:
         return len(self.starts)
 
+    @property
+    def lengths(self) -> Ints:
+        """[N] frames of each node."""
+        return self.stops - self.starts
+
     def motion(self, node: int) -> Floats:
         """[L, D] what the node captured."""
         return self.frames[self.starts[node] : self.stops[node]]

@@ -38,6 +38,8 @@ from facesynth.methods.anime_graph.search import Weights
 from facesynth.methods.anime_graph.soft import mean_motion
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import FaceStream, Stream
+from facesynth.methods.efase.prediction import PosePredictor
+from facesynth.methods.efase.sharpening import sharpen
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
@@ -73,6 +75,13 @@ class AnimeGraph(Method):
         Which components the maps change, in place of the automatic split.
     temperature : float
         0 is the cheapest path (the paper); above, the mean over all paths, the cheaper the more, in the unit of eq. 2.
+    pose_weight : float
+        Of a node's squared distance (mean over channels, mm²) from the pose that sound and phones lead one to expect.
+    sharpening : float
+        How much quick movement is raised (see `facesynth.methods.efase.sharpening`); a mean moves too little.
+    learn : bool
+        `fit` starts from these weights, learns those above 0, and the sharpening, on sentences that it keeps out of the
+        graph meanwhile, and leaves what it found in `config`.
     help_pairs : bool
         Whether a recorded pair of the two phones helps to bridge a jump; without, every jump is a cross-fade.
     """
@@ -93,6 +102,9 @@ class AnimeGraph(Method):
         emotional_components: Sequence[int] | None = None,
         help_pairs: bool = True,
         temperature: float = 0.0,
+        pose_weight: float = 0.0,
+        sharpening: float = 0.0,
+        learn: bool = False,
     ) -> None:
         super().__init__(
             variance=variance,
@@ -106,19 +118,37 @@ class AnimeGraph(Method):
             emotional_components=emotional_components,
             help_pairs=help_pairs,
             temperature=temperature,
+            pose_weight=pose_weight,
+            sharpening=sharpening,
+            learn=learn,
         )
-        if not 0 <= temperature < float("inf"):
-            raise FacesynthError(f"temperature must be 0 (the cheapest path) or above; got {temperature}")
-        self.weights = Weights(jump_weight, jump_cost_weight, audio_weight)
+        for name, value in (("temperature", temperature), ("pose_weight", pose_weight), ("sharpening", sharpening)):
+            if not 0 <= value < float("inf"):
+                raise FacesynthError(f"{name} must be 0 (as in the paper) or above; got {value}")
         self.audio = AudioFeatures(parameters)
         self.components = FaceComponents()
         self.maps = EmotionMaps()
+        self.predictor = PosePredictor() if pose_weight > 0 else None
         self.map_settings = MapSettings(map_width, map_kernel, map_centres)
         self.nodes = nn.Module()
         self._chooser: Chooser | None = None
 
+    @property
+    def weights(self) -> Weights:
+        """Of the cost."""
+        return Weights(*(self.config[name] for name in ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")))
+
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
-        """Learn components, graph, cut-offs and the maps of every pair of emotions with parallel sentences."""
+        """Learn components, graph, cut-offs and the maps of every pair of emotions with parallel sentences.
+
+        `seed` starts the components and the maps, and draws the sentences that `learn` holds out.
+        """
+        if self.config["learn"]:
+            from facesynth.methods.anime_graph.learning import learn  # it needs this class
+
+            learned = learn(corpus, self.config, seed=seed)
+            self.config |= learned.settings
+            self.facts["learned"] = learned.account
         self.learned_from(corpus)
         frames = corpus.arrays().frames
         frames = frames[np.isfinite(frames).all(axis=1)]
@@ -140,9 +170,15 @@ class AnimeGraph(Method):
         runs = (graph.frames[a:b] for a, b in sorted(set(zip(graph.run_starts, graph.run_stops, strict=True))))
         self.register_buffer("cutoffs_hz", torch.from_numpy(cutoffs_hz(runs, self.fps)))
         self.facts["utterances"] = list(corpus.ids)
+        if self.predictor is not None:
+            self.predictor.learn(corpus, self.in_metric, seed)
         self._fit_maps([take for take in takes if take is not None], seed)
         self._chooser = None
         return self
+
+    def in_metric(self, frames: torch.Tensor) -> torch.Tensor:
+        """Frames [T, C] as components times metric [T, D], whose squared distance is the mean over the channels."""
+        return self.components.encode(frames) @ self.components.metric
 
     def _fit_maps(self, takes: Sequence[Take], seed: int) -> None:
         """A map for every ordered pair of emotions; why there is none is kept for those who ask for it."""
@@ -237,7 +273,8 @@ class AnimeGraph(Method):
         to_emotion, to_intensity: find motion in the speech's own emotion and map it to this one.
         """
         plan = self.plan(speech, look_ahead=look_ahead)
-        motion = self._motion(low_pass(self._joined(plan), self.cutoffs_hz.numpy(), self.fps), speech)
+        smooth = low_pass(self._joined(plan), self.cutoffs_hz.numpy(), self.fps)
+        motion = self._motion(sharpen(smooth, self.config["sharpening"], self.fps), speech)
         motion = self._with_intensity(motion, speech)
         return motion if to_emotion is None else self.map_along(motion, speech, to_emotion, intensity=to_intensity)
 
@@ -278,7 +315,10 @@ class AnimeGraph(Method):
         return gaussian_filter1d(over_time, EMOTION_CHANGES_S * motion.fps, mode="nearest")
 
     def open_stream(self, *, look_ahead: int = 4) -> FaceStream:
-        """Something to push phones into and take frames from; `look_ahead` phones (the paper: 3 to 6) are waited for."""
+        """Something to push phones into and take frames from; `look_ahead` phones (the paper: 3 to 6) are waited for.
+
+        A stream takes the cheapest path, whatever the temperature, and is not sharpened.
+        """
         stream = Stream(
             self.chooser,
             self.weights,
@@ -331,10 +371,16 @@ class AnimeGraph(Method):
                     raise unknown(what, name, known)
         features = self.audio.of(speech)
         heard = ranges(speech.phones, self.audio.fps, len(features))
-        lengths = np.diff(speech.phones.frame_bounds(self.fps)).tolist()
+        bounds, felt = speech.phones.frame_bounds(self.fps), np.array([self.emotions.index(e) for e in feelings])
+        poses: list[NDArray[np.float64] | None] = [None] * len(felt)
+        if self.predictor is not None:
+            poses = list(np.split(self.predictor.at(speech, felt, len(self.emotions), self.fps, int(bounds[-1])), bounds[1:-1]))
+        lengths = np.diff(bounds).tolist()
         return [
-            Wish(PHONE_INDEX[label], self.emotions.index(emotion), features[a:b], length)
-            for label, emotion, (a, b), length in zip(speech.phones.labels, feelings, heard.tolist(), lengths, strict=True)
+            Wish(PHONE_INDEX[label], int(emotion), features[a:b], length, pose)
+            for label, emotion, (a, b), length, pose in zip(
+                speech.phones.labels, felt, heard.tolist(), lengths, poses, strict=True
+            )
         ]
 
     def _motion(self, components: NDArray[np.float64], speech: Speech) -> Motion:

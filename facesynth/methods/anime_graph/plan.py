@@ -26,6 +26,8 @@ class Wish:
     """[m, P] audio features."""
     frames: int
     """Length of the phone in the output."""
+    expected: NDArray[np.float64] | None = None
+    """[frames, D] pose that the sound leads one to expect, as components times metric; None where nothing predicts it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float
     """Candidates and their costs for each phone."""
     candidates = [chooser.candidates(wish.phone, wish.emotion) for wish in wishes]
     before = [None, *candidates[:-1]]
-    steps = [make_step(chooser, c, b, w.wanted, metric) for c, b, w in zip(candidates, before, wishes, strict=True)]
+    steps = [make_step(chooser, c, b, w.wanted, metric, w.expected) for c, b, w in zip(candidates, before, wishes, strict=True)]
     return candidates, steps
 
 
@@ -126,6 +128,7 @@ def explain(
                 "jump": weights.jump * jumped,
                 "jump_cost": weights.jump_cost * float(apart),
                 "audio_cost": weights.audio * float(step.audio[chosen]),
+                "pose_cost": 0.0 if step.pose is None else weights.pose * float(step.pose[chosen]),
                 "right_phone": bool(graph.phones[node] == wish.phone),
                 "right_viseme": plan.candidates[t].phone_level != "any phone",
                 "right_emotion": bool(graph.emotions[node] == wish.emotion),

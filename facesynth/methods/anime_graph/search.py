@@ -15,11 +15,17 @@ from facesynth.errors import FacesynthError
 
 @dataclass(frozen=True)
 class Weights:
-    """Of eq. 2: jumps, their cost (RMS mm) and the audio cost."""
+    """Of eq. 2: jumps, their cost (RMS mm) and the audio cost; beyond the paper, of the expected pose."""
 
     jump: float = 100.0
     jump_cost: float = 1.0
     audio: float = 0.01
+    pose: float = 0.0
+
+    def target(self, step: Step) -> NDArray[np.float64]:
+        """[n] what each candidate of a step costs, wherever one comes from."""
+        cost = self.audio * step.audio
+        return cost if step.pose is None else cost + self.pose * step.pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +40,8 @@ class Step:
     """[n, D] last frame of each."""
     link: NDArray[np.int64]
     """[n] the candidate of the phone before that was recorded just before this one, or -1."""
+    pose: NDArray[np.float64] | None = None
+    """[n] mean squared distance of each from the pose that the sound leads one to expect; None where nothing predicts it."""
 
 
 @njit(cache=True, fastmath={"reassoc", "contract"})
@@ -71,13 +79,13 @@ def best_path(steps: Sequence[Step], weights: Weights, *, start: int | None = No
     optimum in O(T n²) where the paper's queue of partial sequences grows exponentially. `start` prescribes the
     candidate of the first step.
     """
-    phi = weights.audio * steps[0].audio
+    phi = weights.target(steps[0])
     if start is not None:
         phi = np.where(np.arange(len(phi)) == start, phi, np.inf)
     origins = []
     for before, step in pairwise(steps):
         reached, origin = _advance(phi, before.last, step.first, step.link, (weights.jump, weights.jump_cost))
-        phi = reached + weights.audio * step.audio
+        phi = reached + weights.target(step)
         origins.append(origin)
     path = [int(phi.argmin())]
     for origin in reversed(origins):
@@ -129,7 +137,7 @@ def look_ahead_path(steps: Sequence[Step], weights: Weights, phones: int) -> NDA
 
 def path_cost(steps: Sequence[Step], path: NDArray[np.int64], weights: Weights) -> float:
     """Eq. 2 of any path [T]."""
-    cost = sum(weights.audio * float(step.audio[c]) for step, c in zip(steps, path, strict=True))
+    cost = sum(float(weights.target(step)[c]) for step, c in zip(steps, path, strict=True))
     for t, (i, j) in enumerate(pairwise(path)):
         if steps[t + 1].link[j] != i:
             cost += weights.jump + weights.jump_cost * float(np.linalg.norm(steps[t].last[i] - steps[t + 1].first[j]))

@@ -27,18 +27,24 @@ def soft_path(steps: Sequence[Step], weights: Weights, temperature: float) -> li
     """The posterior probability [n] of each candidate of each phone; temperature in the unit of eq. 2, above 0."""
     if not temperature > 0:
         raise FacesynthError(f"a soft search needs a temperature above 0; got {temperature:g}: take best_path instead")
-    targets = [torch.from_numpy(weights.audio * step.audio) for step in steps]
+    targets = [torch.from_numpy(weights.target(step)) for step in steps]
     moves = [torch.from_numpy(step_costs(before, step, weights)) for before, step in pairwise(steps)]
     return [shares.numpy() for shares in posterior(targets, moves, temperature).nodes]
 
 
 def step_costs(before: Step, step: Step, weights: Weights) -> NDArray[np.float64]:
     """[n, n'] what eq. 2 asks for the step from each candidate to each of the next phone; nothing where it was captured."""
+    jumps, apart = step_terms(before, step)
+    return weights.jump * jumps + weights.jump_cost * apart
+
+
+def step_terms(before: Step, step: Step) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """[n, n'] 1 where a step is a jump, and how far apart the frames are that meet there; 0 where it was captured."""
     squared = (before.last**2).sum(axis=1)[:, None] + (step.first**2).sum(axis=1) - 2 * before.last @ step.first.T
-    costs = weights.jump + weights.jump_cost * np.sqrt(np.maximum(squared, 0.0))
+    jumps, apart = np.ones_like(squared), np.sqrt(np.maximum(squared, 0.0))
     linked = np.flatnonzero(step.link >= 0)
-    costs[step.link[linked], linked] = 0.0
-    return np.asarray(costs)
+    jumps[step.link[linked], linked] = apart[step.link[linked], linked] = 0.0
+    return jumps, apart
 
 
 def mean_motion(chooser: Chooser, plan: Plan, weights: Weights, temperature: float) -> NDArray[np.float64]:

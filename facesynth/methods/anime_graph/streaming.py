@@ -54,7 +54,7 @@ class Stream:
         before = self.candidates[-1] if self.candidates else None
         self.wishes.append(wish)
         self.candidates.append(candidates)
-        self.steps.append(make_step(self.chooser, candidates, before, wish.wanted, self.metric))
+        self.steps.append(make_step(self.chooser, candidates, before, wish.wanted, self.metric, wish.expected))
         self._settle(self.search.push(self.steps[-1]))
         return self._emit(round(FILTER_SETTLES_S * self.fps), pieces_unsettled=2)
 

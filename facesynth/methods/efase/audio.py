@@ -10,6 +10,7 @@ Two terms, both 0 in the paper:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -102,7 +103,14 @@ class AudioTerms(nn.Module):
         if self.sound is not None:
             self.sound.learn(corpus, names, phones)
         if self.predictor is not None:
-            self.predictor.learn(corpus, pca, seed)
+            self.predictor.learn(corpus, pca.encode, seed)
+
+    def count_by(self, sound: Sequence[float], pose: Sequence[float]) -> None:
+        """Let the squared differences of each component of the sound and of the pose count by these factors."""
+        if self.sound is not None:
+            self.sound.rescale(torch.tensor(sound, dtype=torch.float32))
+        if self.predictor is not None:
+            self.predictor.metric = torch.tensor(pose, dtype=torch.float32)
 
     @property
     def empty(self) -> bool:

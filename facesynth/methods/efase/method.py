@@ -56,6 +56,9 @@ class Efase(Method):
     path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
     (see `soft`): nearer to the truth on average, with less motion. `audio_weight` and `pose_weight` let the sound
     speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`); 0 in the paper.
+
+    With `learn`, `fit` starts from these weights, learns all that are above 0 on sentences of the corpus that it keeps
+    out of the database meanwhile (see `learning`), and leaves what it found in `config`.
     """
 
     pca: Pca
@@ -89,6 +92,7 @@ class Efase(Method):
         audio_weight: float = 0.0,
         pose_weight: float = 0.0,
         sharpening: float = 0.0,
+        learn: bool = False,
     ) -> None:
         super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
         lowest = min(temperature, audio_weight, pose_weight, sharpening)
@@ -105,7 +109,16 @@ class Efase(Method):
         self._gaps: dict[int, float] = {}
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
-        """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
+        """Cut the corpus into nodes and prepare the search.
+
+        `seed` picks the pairs that PNT is scaled by, and the sentences that `learn` holds out.
+        """
+        learned = None
+        if self.config["learn"]:
+            from facesynth.methods.efase.learning import learn  # it needs this class
+
+            learned = learn(corpus, self.config, seed=seed)
+            self.config |= learned.settings
         self.learned_from(corpus)
         database = build_database(corpus, self.config["database_fps"], self.config["components"])
         nodes = database.nodes
@@ -116,6 +129,9 @@ class Efase(Method):
         self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
         self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
         self.audio.learn(corpus, self.pca, database.names, nodes.phones, seed)
+        if learned is not None:
+            self.audio.count_by(learned.sound_metric, learned.pose_metric)
+            self.facts["learned"] = learned.account
         self._keep_index()
         return self
 

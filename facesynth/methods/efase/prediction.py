@@ -5,6 +5,7 @@ It predicts the average, which moves too little; the search uses it to tell whic
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from facesynth.methods.baselines.frames import complete
 from facesynth.methods.baselines.hearing import Hearing
 from facesynth.methods.baselines.tcn import network
 from facesynth.methods.efase.nodes import Floats, Ints
-from facesynth.motion.pca import Pca
 from facesynth.motion.resample import resample
 from facesynth.progress import track
 from facesynth.speech.phones import PHONES
@@ -44,7 +44,7 @@ class Tracks(NamedTuple):
 
 
 class PosePredictor(nn.Module):
-    """From log-mel bands, phones and emotion to PCA coordinates: four 1-D convolutions that reach ±240 ms."""
+    """From log-mel bands, phones and emotion to coordinates of the motion: four 1-D convolutions that reach ±240 ms."""
 
     scale: Tensor
     """[1] largest standard deviation of a coordinate."""
@@ -58,10 +58,13 @@ class PosePredictor(nn.Module):
         self.register_buffer("scale", torch.ones(1))
         self.register_buffer("metric", torch.ones(0))
 
-    def learn(self, corpus: Corpus, pca: Pca, seed: int) -> None:
-        """AdamW on the squared error of the complete frames; the same seed gives the same weights on one machine."""
+    def learn(self, corpus: Corpus, encode: Callable[[Tensor], Tensor], seed: int) -> None:
+        """AdamW on the squared error of the complete frames; the same seed gives the same weights on one machine.
+
+        encode: frames [T, C] to the coordinates [T, D] that are to be predicted, whose distances are those of frames.
+        """
         self.hearing.learn(corpus)
-        tracks = [self._tracks(utterance, corpus.emotions, pca) for utterance in corpus]
+        tracks = [self._tracks(utterance, corpus.emotions, encode) for utterance in corpus]
         everything = torch.cat([t.moved[t.present > 0] for t in tracks])
         self.scale = everything.std(dim=0).max().clamp(min=1e-6).reshape(1)
         self.metric = torch.ones(everything.shape[1])
@@ -86,12 +89,12 @@ class PosePredictor(nn.Module):
         labels = torch.from_numpy(np.hstack([PHONE_SIZE * np.eye(len(PHONES))[said], np.eye(emotion_count)[emotions[number]]]))
         return torch.cat([bands, labels.to(bands)], dim=1)
 
-    def _tracks(self, utterance: Utterance, emotions: tuple[str, ...], pca: Pca) -> Tracks:
+    def _tracks(self, utterance: Utterance, emotions: tuple[str, ...], encode: Callable[[Tensor], Tensor]) -> Tracks:
         speech, motion = utterance.speech, resample(utterance.motion, RATE)
         felt = np.array([emotions.index(e) for e in speech.emotions.per_phone(speech.phones)[0]])
         heard = self._heard(speech, felt, len(emotions), np.arange(len(motion)) / RATE)
         present = torch.from_numpy(complete(motion.frames))
-        moved = pca.encode(torch.from_numpy(np.nan_to_num(motion.frames)))
+        moved = encode(torch.from_numpy(np.nan_to_num(motion.frames))).float()
         return Tracks(heard, moved * present[:, None], present.float())
 
 

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
+import torch
 from scipy.ndimage import gaussian_filter1d
+from torch import Tensor
 
 from facesynth.methods.efase.nodes import Floats
+from facesynth.motion.motion import Motion
 
 QUICK_S = 0.08
 """Standard deviation of the smoothing that parts slow movement from quick."""
 ROUGH_S = 0.02
 """What is quicker than this is joints and the noise of sensors: it is smoothed away, not raised."""
+SHARES = np.linspace(0, 2, 9)
+"""Where a share is looked for; more would be a caricature."""
 
 
 def sharpen(frames: Floats, share: float, fps: float) -> Floats:
@@ -20,5 +28,39 @@ def sharpen(frames: Floats, share: float, fps: float) -> Floats:
     """
     if share == 0:
         return frames
-    smooth = gaussian_filter1d(frames, ROUGH_S * fps, axis=0, mode="nearest")
+    smooth = _smooth(frames, fps)
     return smooth + share * (smooth - gaussian_filter1d(smooth, QUICK_S * fps, axis=0, mode="nearest"))
+
+
+def sharpening_matrix(count: int, share: float, fps: float) -> Tensor:
+    """[count, count] what `sharpen` multiplies that many frames by."""
+    return torch.from_numpy(sharpen(np.eye(count), share, fps))
+
+
+def matching_share(pairs: Iterable[tuple[Motion, Motion]]) -> float:
+    """The share with which motion moves as much as recorded, by pairs (unsharpened, recorded) of one rate.
+
+    Compared are mean speeds without roughness, of which a sensor's noise would be the larger part, over the frames
+    that were recorded. From 0, where nothing is missing, to the last of SHARES.
+    """
+    ratios = np.mean([_speed_ratios(made, truth) for made, truth in pairs], axis=0)
+    return float(np.interp(1.0, ratios, SHARES))
+
+
+def _speed_ratios(made: Motion, truth: Motion) -> Floats:
+    """[S] mean speed of a motion sharpened by each of SHARES over that of the recording."""
+    count, fps = min(len(made), len(truth)), truth.fps
+    recorded = _speeds(truth, _smooth(truth.frames[:count].astype(np.float64), fps))
+    present = np.isfinite(recorded)
+    sharp = [sharpen(made.frames[:count].astype(np.float64), share, fps) for share in SHARES]
+    made_speeds = [_speeds(made, _smooth(frames, fps))[present].mean() for frames in sharp]
+    return np.array(made_speeds) / max(recorded[present].mean(), 1e-12)
+
+
+def _speeds(motion: Motion, frames: Floats) -> Floats:
+    """[T - 1, K] how far each point of a motion's layout goes from frame to frame."""
+    return np.asarray(np.linalg.norm(np.diff(motion.layout.points(frames), axis=0), axis=2))
+
+
+def _smooth(frames: Floats, fps: float) -> Floats:
+    return np.asarray(gaussian_filter1d(frames, ROUGH_S * fps, axis=0, mode="nearest"))

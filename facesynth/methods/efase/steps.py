@@ -8,6 +8,7 @@ gradient in them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -15,6 +16,22 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
+
+
+class Pieces(Protocol):
+    """Nodes of any database: node n moves through `frames[starts[n] : starts[n] + lengths[n]]`."""
+
+    @property
+    def frames(self) -> Floats:
+        """[F, D]"""
+
+    @property
+    def starts(self) -> Ints:
+        """[N]"""
+
+    @property
+    def lengths(self) -> Ints:
+        """[N] in frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +79,7 @@ def step_terms(nodes: MotionNodes, before: Ints, after: Ints) -> StepTerms:
     return StepTerms(*(torch.from_numpy(np.ascontiguousarray(term, np.float64)) for term in terms))
 
 
-def stretched(nodes: MotionNodes, which: Ints, count: int) -> Floats:
+def stretched(nodes: Pieces, which: Ints, count: int) -> Floats:
     """[n, count, D] the motions of the nodes `which`, each time-warped to `count` frames."""
     lengths = nodes.lengths[which]
     share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)

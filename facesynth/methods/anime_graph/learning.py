@@ -1,0 +1,135 @@
+"""Weights of the cost of the anime graph, learned by gradient through the mean over paths; see `efase.descent`.
+
+As in eFASE the mean is differentiable in every cost, and so is its distance to recordings that the graph does not have.
+Learned are the weights of jumps, of their size, of the sound and of the expected pose; the temperature is what they are
+measured by and stays. How much the mean must be sharpened is taken from the sentences that say when to stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facesynth.corpus import Corpus, Utterance
+from facesynth.errors import FacesynthError
+from facesynth.methods.anime_graph.candidates import stretched_motions
+from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.anime_graph.plan import lay_steps
+from facesynth.methods.anime_graph.soft import step_terms
+from facesynth.methods.efase.descent import Logs, descend, three_parts, with_gaps
+from facesynth.methods.efase.sharpening import matching_share, sharpening_matrix
+from facesynth.methods.efase.soft import posterior
+from facesynth.progress import track
+
+NUMBERS = ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")
+CANDIDATES = 80
+"""Nodes of each phone that take part in learning; synthesis knows no such limit."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What learning found."""
+
+    settings: dict[str, float]
+    """Settings of `AnimeGraph`."""
+    errors: tuple[float, ...]
+    """Validation error before learning and after each round, squared unit of the layout, mean over channels."""
+
+    @property
+    def improvement(self) -> float:
+        """Share of the validation error that learning took away."""
+        return 1 - min(self.errors) / self.errors[0]
+
+    @property
+    def account(self) -> dict[str, Any]:
+        """What a trained model remembers of it."""
+        return {"rounds": len(self.errors) - 1, "improvement": self.improvement, "settings": self.settings}
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """One utterance of P phones with n_t candidates each."""
+
+    audio: Sequence[Tensor]
+    """P of [n] audio costs."""
+    pose: Sequence[Tensor]
+    """P of [n] pose costs."""
+    motion: Sequence[Tensor]
+    """P of [n, L, D] each candidate, stretched evenly to the phone, as components times metric."""
+    jumps: Sequence[Tensor]
+    """P - 1 of [n, n'] 1 where a step is a jump."""
+    apart: Sequence[Tensor]
+    """P - 1 of [n, n'] distance of the frames that meet there."""
+    truth: Tensor
+    """[T, D] what was recorded, NaN in gaps."""
+    sharp: Tensor
+    """[T, T] what sharpening does to T frames."""
+
+
+def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> Learned:
+    """Learn on sentences that the graph does not have; `pull` weighs the way from the start against the relative error.
+
+    `settings` are those of `AnimeGraph`, with a temperature above 0. A sharpening above 0 is learned as well.
+    """
+    if not settings.get("temperature", 0) > 0:
+        raise FacesynthError("learning goes through the mean over paths; give a temperature above 0 (2 is a start)")
+    graph, *held_out = three_parts(corpus, seed)
+    model = AnimeGraph.from_config({**settings, "learn": False}).fit(graph, seed=seed)
+    examples, others = ([lattice_of(model, u) for u in track(part, "lattices", len(part))] for part in held_out)
+    logs, temperature = Logs({name: model.config[name] for name in NUMBERS}, {}), model.config["temperature"]
+    errors = descend(
+        logs, lambda some, numbers: mean_error(some, numbers, temperature), examples, others, seed=seed, rounds=rounds, pull=pull
+    )
+    found = logs.found()
+    if model.config["sharpening"] > 0:
+        model.config |= found | {"sharpening": 0.0}
+        pairs = [(model.synthesize(u.speech), u.motion) for u in track(held_out[1], "sharpening", len(held_out[1]))]
+        found["sharpening"] = matching_share(pairs)
+    return Learned(found, errors)
+
+
+def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> Tensor:
+    """Mean over frames of ‖sharpened posterior mean - truth‖², differentiable in the weights."""
+    total, count, values = torch.zeros((), dtype=torch.float64), 0, logs.values()
+    for lattice in lattices:
+        moves = zip(lattice.jumps, lattice.apart, strict=True)
+        found = posterior(
+            [values["audio_weight"] * a + values["pose_weight"] * p for a, p in zip(lattice.audio, lattice.pose, strict=True)],
+            [values["jump_weight"] * jumps + values["jump_cost_weight"] * apart for jumps, apart in moves],
+            temperature,
+        )
+        means = [torch.tensordot(shares, motion, 1) for shares, motion in zip(found.nodes, lattice.motion, strict=True)]
+        error = (lattice.sharp @ torch.cat(means) - lattice.truth).square().sum(dim=1)
+        present = torch.isfinite(error)
+        total, count = total + error[present].sum(), count + int(present.sum())
+    return total / max(count, 1)
+
+
+def lattice_of(model: AnimeGraph, utterance: Utterance) -> Lattice:
+    """Of one recorded utterance, the CANDIDATES of each phone that cost least by themselves under the model's weights."""
+    wishes, metric = model.wishes(utterance.speech), model.components.metric.numpy()
+    candidates, steps = lay_steps(model.chooser, wishes, metric)
+    kept = [np.sort(np.argsort(model.weights.target(step), kind="stable")[:CANDIDATES]) for step in steps]
+    count = sum(wish.frames for wish in wishes)
+    some = [replace(c, nodes=c.nodes[k], maps=c.maps[k]) for c, k in zip(candidates, kept, strict=True)]
+    terms = [[x[np.ix_(i, j)] for x in step_terms(a, b)] for (a, b), (i, j) in zip(pairwise(steps), pairwise(kept), strict=True)]
+    return Lattice(
+        _tensors(step.audio[k] for step, k in zip(steps, kept, strict=True)),
+        _tensors(np.zeros(len(k)) if step.pose is None else step.pose[k] for step, k in zip(steps, kept, strict=True)),
+        _tensors(stretched_motions(model.chooser, c, w.frames) @ metric for c, w in zip(some, wishes, strict=True)),
+        _tensors(jumps for jumps, _ in terms),
+        _tensors(apart for _, apart in terms),
+        with_gaps(model.in_metric(torch.from_numpy(utterance.motion.frames)), count),
+        sharpening_matrix(count, model.config["sharpening"], model.fps),
+    )
+
+
+def _tensors(arrays: Iterable[NDArray[np.float64]]) -> list[Tensor]:
+    return [torch.from_numpy(np.ascontiguousarray(array, np.float64)) for array in arrays]
