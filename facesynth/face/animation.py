@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.errors import FacesynthError
+from facesynth.face.closures import with_lips_met
 from facesynth.face.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
 from facesynth.face.markers import LipGap, marker_vertices
 from facesynth.face.rig import ARKIT_NAMES, LOOK_DOWN_RAD, LOOK_OUT_RAD, LOOK_UP_RAD, PIVOT_MM, Rig, gaze_weights
@@ -133,7 +134,8 @@ def animate(
 
     Points become weights by bounded least squares on the rig, wherever they lie on it (`fit_layout`); curves with ARKit
     names pass through, and where no curve has such a name all keep their own. Blinks and
-    gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`.
+    gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`, and so do
+    the lips of another performer's points at p, b and m.
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def animate(
     if motion.layout.kind == "curves" and not arkit_columns(motion.layout):
         values = np.clip(motion.frames, 0, 1)
         return FaceAnimation(motion.layout.names, values, head, gaze, np.zeros(len(motion)), motion.fps)
-    weights, residual = _weights(motion, rig)
+    weights, residual = _weights(motion, rig, phones)
     shut = _lids(motion, weights, seed) if eyes_gain else np.zeros(len(motion))
     _set_lids(weights, shut, awake=eyes_gain == 0)
     weights = gaze_weights(weights, gaze)
@@ -167,7 +169,7 @@ def _check_whole(motion: Motion) -> None:
             raise FacesynthError(f"{name} of the motion hold NaN or infinite values; fill the gaps first")
 
 
-def _weights(motion: Motion, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if motion.layout.kind == "curves":
         return _curves(motion), None
     from facesynth.face.blendshapes import MarkerBasis, solve_markers
@@ -180,7 +182,8 @@ def _weights(motion: Motion, rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.
         return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
     fit = fit_layout(rig, motion.layout, rest_of(motion))
     frames = fit.on_head(rig, motion.frames).reshape(len(motion), -1)
-    return solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
+    weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
+    return (weights if phones is None else with_lips_met(weights, LipGap.of(rig), phones, motion.fps)), residual
 
 
 def arkit_columns(layout: Layout) -> dict[str, int]:

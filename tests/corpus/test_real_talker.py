@@ -74,3 +74,23 @@ def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
             off_mm.append(animation.residual_mm.mean())
     assert np.median(alike) > 0.97
     assert np.median(off_mm) < 1.5
+
+
+@pytest.mark.slow
+def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus):
+    pytest.importorskip("anny", reason="the head is not installed")
+    from facesynth.face.animation import animate
+    from facesynth.face.markers import LipGap
+    from facesynth.face.rig import load_head
+
+    rig = load_head()
+    least_mm = []
+    for utterance in list(corpus)[:10]:
+        phones, motion = utterance.speech.phones, utterance.motion
+        if np.isfinite(motion.frames).all() and np.isfinite(motion.head).all():
+            opening = LipGap.of(rig).opening_mm(animate(motion, rig, phones=phones).weights)
+            ends = np.rint(phones.ends_s * motion.fps).astype(int)
+            spans = zip(phones.labels, [0, *ends[:-1]], ends, strict=True)
+            least_mm += [opening[start : max(end, start + 1)].min() for label, start, end in spans if label in "pbm"]
+    assert len(least_mm) > 10
+    assert np.mean(np.array(least_mm) < 0.1) > 0.9
