@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from facesynth.evaluation.compare import OVERTAKEN
 from facesynth.evaluation.contestants import Family
 from facesynth.evaluation.figures import COLOURS, as_uri, new_figure
 from facesynth.evaluation.table import Comparison, Score
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FIGURES = ("marker_error", "lve", "lve_centred", "energy_ratio", "rtf", "train_s")
+"""Times are the processor's where they were measured."""
 
 
 def family_figure(comparison: Comparison, family: Family) -> str:
@@ -25,7 +27,9 @@ def family_figure(comparison: Comparison, family: Family) -> str:
     places = _places(comparison, family, labels)
     height = 5.0 if places is not None else 1.0 + 0.55 * len(labels)
     figure, axes = new_figure(11, height, 2, 3) if places is not None else new_figure(11, 2 * height, 2, 3, sharey=True)
-    for axis, name in zip(axes.ravel(), FIGURES, strict=True):
+    for axis, asked in zip(axes.ravel(), FIGURES, strict=True):
+        timed = OVERTAKEN.get(asked, asked)
+        name = timed if all(comparison.scores[label][timed].utterances for label in labels) else asked
         scores = [comparison.scores[label][name] for label in labels]
         unit = next(column.unit for column in comparison.columns if column.name == name)
         axis.set_title(name if unit == "1" else f"{name} ({unit})", fontsize=9)

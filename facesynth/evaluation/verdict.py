@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import SECOND_TAKE
+from facesynth.evaluation.curve import Point
 from facesynth.evaluation.paired import Difference
 from facesynth.evaluation.table import short_number
 
@@ -32,43 +34,67 @@ def verdicts(result: Evaluation) -> list[Verdict]:
 
 
 def _verdict(result: Evaluation, label: str) -> Verdict:
-    scores, parts, good = result.comparison.scores, [], True
+    scores, parts, lost = result.comparison.scores, [], []
     units = {column.name: column.unit for column in result.comparison.columns}
     for figure in FIGURES:
         mine, still = scores[label][figure], scores[MEAN_FACE][figure]
         if not mine.utterances or not still.utterances:
             continue
-        good = good and mine.mean < still.mean
+        way = "less"
+        if mine.mean >= still.mean:
+            way = "MORE"
+            lost.append(figure)
         sure = _sure(result.differences, label, figure)
-        way = "less" if mine.mean < still.mean else "MORE"
         parts.append(
             f"{figure} {short_number(mine.mean)} {units[figure]}, {way} than the mean face's {short_number(still.mean)}"
             f" ({'told apart' if sure else 'not told apart'})"
         )
-    why = "" if good else " " + reason(result, label)
-    return Verdict(label, good, f"{'; '.join(parts)}.{why}")
+    why = " ".join(["", *reasons(result, label, lost)]) if lost else ""
+    return Verdict(label, not lost, f"{'; '.join(parts)}.{why}")
 
 
-def reason(result: Evaluation, label: str) -> str:
-    """Which part of the lip error is movement and which the pose held, from the curve of sizes of movement."""
+def reasons(result: Evaluation, label: str, lost: Sequence[str]) -> list[str]:
+    """Sentences on where the error comes from: the pose held, the movement made, and what is drawn from chance."""
+    found = ["Over the lips it is better; it loses over the rest of the face."] if lost == ["marker_error"] else []
     trade = sorted((p for p in result.details[label].trade if p.sharpening == 0), key=lambda point: point.gain)
     if not trade:
-        return "The layout does not tell lip error by size of movement."
-    whole = next(point for point in trade if point.gain == 1.0)
-    still, best = trade[0], min(trade, key=lambda point: point.lve)
+        return [*found, "The layout does not tell lip error by size of movement."]
     unmoved = result.comparison.scores[MEAN_FACE]["lve"].mean
-    parts = [
-        f"Held still at each utterance's own mean pose it would have an lve of {short_number(still.lve)} "
-        f"(the mean face: {short_number(unmoved)})"
-    ]
-    if still.lve > unmoved:
-        parts.append("so the pose that it holds is wrong to begin with")
+    return [*found, _pose(trade[0], unmoved), _movement(trade), *_chance(result, label)]
+
+
+def _pose(still: Point, unmoved: float) -> str:
+    words = f"Standing still in the mean pose of each of its utterances it would have an lve of {short_number(still.lve)}"
+    if still.lve < unmoved:
+        return f"{words}, less than the mean face's {short_number(unmoved)}: how it holds the face is not the fault."
+    return (
+        f"{words}, and the mean face has {short_number(unmoved)}: "
+        "how it holds the face in an utterance is no nearer to the recording than the mean of all recordings."
+    )
+
+
+def _movement(trade: Sequence[Point]) -> str:
+    """`trade` by rising gain."""
+    whole, best = next(point for point in trade if point.gain == 1.0), min(trade, key=lambda point: point.lve)
+    words = f"It moves {short_number(whole.energy_ratio)} times as much as recorded"
+    if best.gain == 0:
+        return f"{words}, and any part of that movement adds to the error: it does not follow the recorded one."
     if best.gain < 1:
-        parts.append(
-            f"and its movement, at {short_number(whole.energy_ratio)} of the recorded energy, is worth most at {best.gain:g} "
-            f"times its size ({short_number(best.lve)}): part of it is not where the recorded movement is"
-        )
-    return ", ".join(parts) + "."
+        nearest = f"nearest ({short_number(best.lve)}) moving {best.gain:g} times as far"
+        return f"{words}, and would be {nearest}: it follows the recorded movement in part."
+    return f"{words}, and moving less would not bring it nearer."
+
+
+def _chance(result: Evaluation, label: str) -> list[str]:
+    scores = result.comparison.scores[label]
+    mean, still = scores["error_of_mean"], result.comparison.scores[MEAN_FACE]["marker_error"]
+    if not mean.utterances:
+        return []
+    side = "less" if mean.mean < still.mean else "no less"
+    return [
+        f"It draws from chance: the mean of several drawn motions has a marker_error of {short_number(mean.mean)}, "
+        f"{side} than the mean face; a single one has {short_number(scores['marker_error'].mean)}."
+    ]
 
 
 def _sure(differences: tuple[Difference, ...], label: str, figure: str) -> bool:

@@ -84,6 +84,79 @@ def test_the_answer_is_known(motion, name, answer, within):
     assert value(name, motion()) == pytest.approx(answer, abs=within)
 
 
+TIMES = tuple(zip(TRACK.labels, TRACK.starts_s, TRACK.ends_s, strict=True))
+LIPS, UPPER, INNER = slice(5, 10), slice(0, 4), ((5, 7), (6, 8))
+CHANGES = (truth, offset, late, doubled, noisy)
+
+
+def opening(points):
+    return np.mean([points[:, up, 1] - points[:, low, 1] for up, low in INNER], axis=0)
+
+
+def shut_share(points, wanted, summary):
+    """Share of the wanted phones whose gap, summed up, is at most what nine tenths of the recorded p, b, m reach."""
+
+    def gaps(of, said):
+        spans = [(label, round(a * FPS), round(b * FPS)) for label, a, b in TIMES]
+        return [
+            (np.min if said is None else said)(opening(of)[a:b]) for label, a, b in spans if label in (wanted if said else "bmp")
+        ]
+
+    recorded = sorted(gaps(truth().points.astype(float), None))
+    threshold = recorded[int(np.ceil(0.9 * len(recorded))) - 1]
+    return np.mean(np.array(gaps(points, summary)) <= threshold)
+
+
+def by_hand(motion):
+    """Every figure from the definition, written out plainly; times and head are known without."""
+    x, y = motion.points.astype(float), truth().points.astype(float)
+    x0, y0 = x - x.mean(axis=0), y - y.mean(axis=0)
+    apart, apart0 = (np.sqrt(((a - b) ** 2).sum(axis=2)) for a, b in ((x, y), (x0, y0)))
+    rest = np.array(LAYOUT.neutral).reshape(-1, 3)
+    spread = [np.sqrt(((p - rest) ** 2).sum(axis=2))[:, UPPER].std(axis=0) for p in (x, y)]
+    speeds = [np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=2)).sum() for p in (x, y)]
+    jerks = [(np.diff(p, n=3, axis=0) ** 2).mean() for p in (x, y)]
+    box = np.concatenate([x, y]).reshape(-1, 3)
+    side = (box.max(axis=0) - box.min(axis=0)).max()
+    gx, gy = opening(x), opening(y)
+    covariance = ((gx - gx.mean()) * (gy - gy.mean())).mean()
+    return {
+        "marker_error": apart.mean(),
+        "marker_error_centred": apart0.mean(),
+        "deng_error": (apart**2).mean(),
+        "unit_cube_rms": np.sqrt((((x - y) / side) ** 2).mean(axis=(1, 2))).mean(),
+        "lve": apart[:, LIPS].max(axis=1).mean(),
+        "lve_sq": (apart[:, LIPS].max(axis=1) ** 2).mean(),
+        "lve_centred": apart0[:, LIPS].max(axis=1).mean(),
+        "fdd": (spread[1] - spread[0]).mean(),
+        "fdd_abs": abs((spread[1] - spread[0]).mean()),
+        "velocity_error": np.sqrt((np.diff(x - y, axis=0) ** 2).sum(axis=2)).mean() * FPS,
+        "lip_gap_corr": np.corrcoef(gx, gy)[0, 1],
+        "lip_gap_ccc": 2 * covariance / (gx.var() + gy.var() + (gx.mean() - gy.mean()) ** 2),
+        "closure_rate": shut_share(x, "bmp", np.min),
+        "false_closure_rate": shut_share(x, ("aa", "ay", "ah"), np.median),
+        "lip_lag": 1000 * SHIFT_S if np.array_equal(motion.frames, late().frames) else 0.0,
+        "jerk_ratio": jerks[0] / jerks[1],
+        "energy_ratio": speeds[0] / speeds[1],
+        "head_cca": 1.0,
+        "head_distance": 0.0,
+    }
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_every_figure_of_every_change_is_what_its_definition_says(change):
+    answers, motion = by_hand(change()), change()
+    assert set(answers) == {one.name for one in METRICS} - {"lip_extrema_lag"}
+    within = {"lip_lag": 3.0}
+    for name, answer in answers.items():
+        assert value(name, motion) == pytest.approx(answer, rel=1e-3, abs=within.get(name, 2e-4)), name
+
+
+@pytest.mark.parametrize(("change", "most_ms"), [(truth, 1e-6), (offset, 1e-3), (doubled, 1e-3), (noisy, 40.0)])
+def test_extrema_that_are_not_late_are_found_where_they_are(change, most_ms):
+    assert 0 <= value("lip_extrema_lag", change()) <= most_ms
+
+
 def test_closure_of_the_truth_itself_is_nine_tenths():
     assert value("closure_rate", truth()) >= 0.9
 

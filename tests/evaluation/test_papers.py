@@ -7,6 +7,7 @@ from corpora import tiny_corpus
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.papers import reproduce
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
+from facesynth.evaluation.papers.joined import joined, phones_until
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def test_deng_2008_prints_the_paper_s_figure_ours_and_that_they_cannot_be_compar
     assert len(times.ours.split(" / ")) == 4
     assert not times.comparable
     assert "hardware" in times.why
-    assert [one.status for one in by_what(result, "phoneme Isomap")] == ["not implemented"]
+    assert [one.status for one in by_what(result, "phoneme Isomap maps")] == ["not implemented"]
     assert by_what(result, "variance in 25")[0].paper == "98.53 %"
     assert "Not implemented here" in result.markdown()
 
@@ -44,6 +45,23 @@ def test_cao_2005_says_what_a_corpus_without_emotions_cannot_give(corpus):
     assert by_what(result, "emotions recognised")[0].status == "not available"
     assert by_what(result, "emotion map")[0].status == "not available"
     assert "single emotion" in result.markdown()
+
+
+def test_speech_as_long_as_a_paper_s_says_the_same_phones(corpus):
+    said = [utterance.speech for utterance in corpus.subset(corpus.ids[:3])]
+    whole = sum(len(speech.phones) for speech in said)
+    long = joined(said, whole + 2)
+    assert long.phones.labels == (*(label for speech in said for label in speech.phones.labels), *said[0].phones.labels[:2])
+    assert len(long.audio) == round(long.phones.duration_s * long.sample_rate)
+    lasted = sum(speech.phones.duration_s for speech in said)
+    assert long.phones.ends_s[whole - 1] == pytest.approx(lasted)
+    assert long.emotions.per_phone(long.phones)[0][0] == said[0].emotions.labels[0]
+    first = said[0].phones
+    assert phones_until(said, first.duration_s + 1e-9) == len(first) + 1
+    assert phones_until(said, first.ends_s[2] + 1e-9) == 3
+    assert phones_until(said, 10 * lasted) > 9 * whole
+    with pytest.raises(FacesynthError, match="sample rate"):
+        joined([], 3)
 
 
 @pytest.mark.slow

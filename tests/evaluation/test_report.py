@@ -98,7 +98,8 @@ def test_a_method_that_loses_to_the_mean_face_is_named_with_the_reason(result, p
     assert said["phone mean"].good
     assert not said["wrong"].good
     assert "MORE than the mean face" in said["wrong"].text
-    assert "the pose that it holds is wrong to begin with" in said["wrong"].text
+    assert "is no nearer to the recording than the mean of all recordings" in said["wrong"].text
+    assert "any part of that movement adds to the error" in said["wrong"].text
     assert "NOT better than the mean face" in page
 
 
