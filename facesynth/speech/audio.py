@@ -22,6 +22,8 @@ SHORTEST_S = 0.05
 SILENT_DB = -60.0
 """Level of the loudest 50 ms, in dB of full scale, below which a sound counts as silence."""
 
+CANCELLED = 0.005
+"""A mean of channels with less than this share of the loudest one's energy: they undo each other (a cable with swapped poles)."""
 LOWEST_HZ = 1000
 """A rate below it is no rate of speech."""
 
@@ -39,10 +41,19 @@ def load_audio(path: str | Path) -> tuple[NDArray[np.float32], int]:
     channels, rate = _read_plain(path) or _read_container(path)
     if channels.shape[0] == 0:
         raise FacesynthError(f"{path} holds 0 samples of sound; record it again")
-    audio = channels.mean(axis=1, dtype=np.float64).astype(np.float32)
+    audio = _mono(channels)
     if not np.isfinite(audio).all():
         raise FacesynthError(f"{path} holds NaN or infinite samples; export the sound again")
     return audio, rate
+
+
+def _mono(channels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """[S] the mean of channels [S, N]; the loudest one where they cancel."""
+    mean = channels.mean(axis=1, dtype=np.float64)
+    energies = np.einsum("sn,sn->n", channels, channels, dtype=np.float64)
+    if mean @ mean < CANCELLED * energies.max(initial=0):
+        return np.array(channels[:, energies.argmax()], np.float32)
+    return mean.astype(np.float32)
 
 
 def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np.float32]:

@@ -47,6 +47,18 @@ def test_stereo_becomes_the_mean_of_its_channels(tmp_path):
     np.testing.assert_allclose(audio, (left + right) / 2, atol=1e-5)
 
 
+def test_channels_that_cancel_are_heard_through_the_louder(tmp_path):
+    soundfile.write(tmp_path / "a.wav", np.stack([0.99 * tone(16000), -tone(16000)], axis=1), 16000)
+    np.testing.assert_allclose(load_audio(tmp_path / "a.wav")[0], -tone(16000), atol=1e-4)
+
+
+def test_one_channel_of_eight_is_no_cancelling(tmp_path):
+    channels = np.zeros((16000, 8))
+    channels[:, 3] = tone(16000)
+    soundfile.write(tmp_path / "a.wav", channels, 16000)
+    np.testing.assert_allclose(load_audio(tmp_path / "a.wav")[0], tone(16000) / 8, atol=1e-4)
+
+
 def test_six_channels(tmp_path):
     soundfile.write(tmp_path / "a.wav", np.tile(tone(16000)[:, None], 6), 16000)
     np.testing.assert_allclose(load_audio(tmp_path / "a.wav")[0], tone(16000), atol=1e-4)
