@@ -19,6 +19,9 @@ FIGURES = ("marker_error", "lve", "lve_centred", "energy_ratio", "rtf", "train_s
 """Times are the processor's where they were measured."""
 
 
+TIMES = ("rtf", "train_s")
+
+
 def family_figure(comparison: Comparison, family: Family) -> str:
     """Means with 95 % intervals of each figure: over the family's axis, or a line for each variant."""
     labels = [label for label in family.labels if label in comparison.scores]
@@ -36,7 +39,7 @@ def family_figure(comparison: Comparison, family: Family) -> str:
         if places is None:
             _lines(axis, scores, labels)
         else:
-            _curve(axis, scores, places)
+            _curve(axis, scores, places, from_zero=asked in TIMES)
             axis.set_xlabel("minutes learned from" if family.axis == "minutes" else family.axis)
             if family.log:
                 axis.set_xscale("log")
@@ -54,12 +57,14 @@ def _places(comparison: Comparison, family: Family, labels: Sequence[str]) -> li
     return [value for label, value in zip(family.labels, family.values, strict=True) if label in labels]
 
 
-def _curve(axis: Axes, scores: Sequence[Score], places: Sequence[float]) -> None:
+def _curve(axis: Axes, scores: Sequence[Score], places: Sequence[float], *, from_zero: bool) -> None:
     order = np.argsort(places)
     at, means = np.asarray(places)[order], np.array([s.mean for s in scores])[order]
     low, high = (np.array([getattr(s, side) for s in scores])[order] for side in ("low", "high"))
     axis.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
     axis.plot(at, means, "o-", color=COLOURS[0], markersize=4)
+    if from_zero:
+        axis.set_ylim(0, None)
 
 
 def _lines(axis: Axes, scores: Sequence[Score], labels: Sequence[str]) -> None:

@@ -80,7 +80,7 @@ def face_figure(details: Mapping[str, Details], face: PointFace, unit: str) -> s
         drawn = _bars(axis, points, face, worst, first=k % columns == 0) if bars else _coloured(axis, points, face, worst)
         axis.set_title(f"{label}: {np.nanmean(points):.3g} {unit}", fontsize=9)
     if drawn is not None:
-        figure.colorbar(drawn, ax=axes, shrink=0.6, label=f"mean error ({unit})")
+        figure.colorbar(drawn, ax=axes, shrink=min(0.6, 1.2 / rows), anchor=(0, 1), label=f"mean error ({unit})")
     return as_uri(figure, "png")
 
 

@@ -127,6 +127,17 @@ def statements(differences: Sequence[Difference]) -> list[tuple[str, str]]:
     ]
 
 
+def tallied(differences: Sequence[Difference]) -> dict[str, dict[str, tuple[int, int]]]:
+    """For each method and figure: from how many it is told apart as the better one, and as the worse one."""
+    found: dict[str, dict[str, tuple[int, int]]] = {}
+    for one in differences:
+        for label in (one.first, one.second):
+            won, lost = found.setdefault(label, {}).get(one.figure, (0, 0))
+            better = one.distinguishable and label == one.better
+            found[label][one.figure] = (won + better, lost + (one.distinguishable and not better))
+    return found
+
+
 def _statement(pairs: Sequence[Difference]) -> str:
     beaten: dict[str, list[str]] = {}
     for one in pairs:

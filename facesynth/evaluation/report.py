@@ -18,16 +18,17 @@ from facesynth.errors import FacesynthError
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Family
-from facesynth.evaluation.curve import LIVELY, MEASURES
+from facesynth.evaluation.curve import LIVELY, MEASURES, Curve, Measure, Point
 from facesynth.evaluation.curve_figure import curve_figure
+from facesynth.evaluation.details import Details
 from facesynth.evaluation.exports import best_labels, write_exports
 from facesynth.evaluation.face_video import worst_shown, write_side_by_side
 from facesynth.evaluation.family_figure import family_figure
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.pair import Array
-from facesynth.evaluation.paired import statements
+from facesynth.evaluation.paired import statements, tallied
 from facesynth.evaluation.point_face import PointFace
-from facesynth.evaluation.table import ARROWS, Comparison
+from facesynth.evaluation.table import ARROWS, Comparison, short_number
 from facesynth.evaluation.tallies import read_motion
 from facesynth.evaluation.trajectories import MOST_SHOWN, trajectory_figure
 from facesynth.evaluation.verdict import verdicts
@@ -36,6 +37,8 @@ from facesynth.progress import track
 
 PAGE = "index.html"
 MOST_PANELS = 5
+MOST_IN_WORDS = 9
+"""Of more rows a sentence each would be read by nobody."""
 SHOWN_LAST = ("tcn", "ridge", SECOND_TAKE, "phone mean", "mean face")
 """Rows that are drawn where there is room, in this order: the less they move, the later."""
 SHAPE_FRAMES = 4000
@@ -73,10 +76,11 @@ def write_report(folder: str | Path, result: Evaluation, corpus: Corpus, familie
 
 
 def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wish: Wish) -> dict[str, Any]:
-    comparison, unit = result.comparison, corpus.layout.unit
+    comparison, unit, pictured = result.comparison, corpus.layout.unit, pictured_rows(result.comparison, families)
+    details = {label: one for label, one in result.details.items() if label in pictured}
     recorded = _some_frames(corpus, comparison.utterances)
     face = PointFace.of(corpus.layout, recorded)
-    matrices = {row.label: row.confusion for row in comparison.rows if row.confusion}
+    matrices = {row.label: row.confusion for row in comparison.rows if row.confusion and row.label in pictured}
     if comparison.recorded_emotions:
         matrices = {"recorded": comparison.recorded_emotions, **matrices}
     return {
@@ -87,16 +91,19 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "notes": comparison.markdown(result.main_columns()).split("\n\n")[1:],
         "whole_notes": comparison.markdown().split("\n\n")[1:],
         "verdicts": verdicts(result),
+        "many": len(comparison.rows) > MOST_IN_WORDS,
+        "left_out": len(comparison.rows) > len(pictured),
         "statements": statements(result.differences),
+        "tally": tallied(result.differences),
         "differences": result.differences,
-        "emotions": _by_emotion(comparison, result.main_columns()),
-        "phones": _phones(result),
+        "emotions": _by_emotion(comparison, result.main_columns(), pictured),
+        "phones": _phones(details),
         **_curves(result, families, unit),
-        "face": figures.face_figure(result.details, face, unit),
-        "histograms": figures.histogram_figure(result.details, unit),
+        "face": figures.face_figure(details, face, unit),
+        "histograms": figures.histogram_figure(details, unit),
         "confusions": figures.confusion_figure(matrices),
         "families": [(family, family_figure(comparison, family)) for family in families],
-        "shown": list(_shown(result, corpus, face, wish)),
+        "shown": list(_shown(result, corpus, face, wish, pictured)),
         "provenance": comparison.provenance,
         "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
         "definitions": {m.name: " ".join(m.definition.split()) for m in METRICS},
@@ -104,12 +111,18 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
     }
 
 
-def table(comparison: Comparison, columns: Sequence[str]) -> dict[str, Any]:
-    """Heads and rows of cells: text, interval, whether it is the best."""
+def pictured_rows(comparison: Comparison, families: Sequence[Family]) -> list[str]:
+    """Rows that have pictures of their own: of each family, which has its picture, only the first variant."""
+    variants = {label for family in families for label in family.labels[1:]}
+    return [row.label for row in comparison.rows if row.label not in variants]
+
+
+def table(comparison: Comparison, columns: Sequence[str], labels: Sequence[str] | None = None) -> dict[str, Any]:
+    """Heads and rows of cells: text, interval, whether it is the best; all rows, or those with `labels`."""
     chosen = [column for column in comparison.columns if column.name in columns]
     best = {column.name: best_labels(comparison, column.name, column.best) for column in chosen}
     rows = []
-    for row in comparison.rows:
+    for row in (row for row in comparison.rows if labels is None or row.label in labels):
         scores = [comparison.scores[row.label][column.name] for column in chosen]
         cells = [
             (*str(s).partition(" [")[::2], row.label in best[c.name], s.utterances) for c, s in zip(chosen, scores, strict=True)
@@ -119,12 +132,12 @@ def table(comparison: Comparison, columns: Sequence[str]) -> dict[str, Any]:
     return {"heads": heads, "rows": rows}
 
 
-def _by_emotion(comparison: Comparison, columns: Sequence[str]) -> dict[str, dict[str, Any]]:
+def _by_emotion(comparison: Comparison, columns: Sequence[str], labels: Sequence[str]) -> dict[str, dict[str, Any]]:
     found = dict.fromkeys(sorted(comparison.emotions))
     if len(found) < 2:
         return {}
     quality = [name for name in columns if any(name in row.values for row in comparison.rows)]
-    return {emotion: table(comparison.of_emotion(emotion), quality) for emotion in found}
+    return {emotion: table(comparison.of_emotion(emotion), quality, labels) for emotion in found}
 
 
 def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[str, Any]:
@@ -135,27 +148,41 @@ def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[s
     crowd = {label for family in families if not family.curve for label in family.labels}
     curves = [curve for curve in result.curves(families) if curve.label not in crowd]
     references = (*REFERENCES, SECOND_TAKE)
-    rows = [(curve.label, [best for m in MEASURES for best in ((m, curve.nearest(m)), (m, curve.lively(m)))]) for curve in curves]
+    rows = [
+        (
+            curve.label,
+            [_best(curve, point, measure) for measure in MEASURES for point in (curve.nearest(measure), curve.lively(measure))],
+        )
+        for curve in curves
+    ]
     return {"trade": curve_figure(curves, references, unit) if curves else "", "curves": rows, "lively": LIVELY}
 
 
-def _phones(result: Evaluation) -> dict[str, Any]:
+def _best(curve: Curve, point: Point | None, measure: Measure) -> tuple[str, str]:
+    """A point in words, and what it takes."""
+    if point is None:
+        return "—", ""
+    sharpened = f"sharpened {point.sharpening:g}" if point.sharpening else ""
+    takes = [part for part in (point.setting if point.setting != curve.label else "", sharpened) if part]
+    return f"{short_number(getattr(point, measure))} at {point.energy_ratio:.2f}", ", ".join(takes)
+
+
+def _phones(details: Mapping[str, Details]) -> dict[str, Any]:
     """For each phone its count, and for each method the lip error before and after alignment in time."""
     rows: dict[str, dict[str, tuple[float, float]]] = {}
     counts: dict[str, int] = {}
-    for label, one in result.details.items():
+    for label, one in details.items():
         for phone in one.phones:
             rows.setdefault(phone.phone, {})[label] = (phone.lip_error, phone.aligned_lip_error)
             counts[phone.phone] = max(counts.get(phone.phone, 0), phone.count)
     order = sorted(rows, key=lambda phone: (-counts[phone], phone))
     return {
-        "labels": [label for label, one in result.details.items() if one.phones],
+        "labels": [label for label, one in details.items() if one.phones],
         "rows": [(p, counts[p], rows[p]) for p in order],
     }
 
 
-def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish) -> Iterator[dict[str, str]]:
-    labels = [row.label for row in result.comparison.rows]
+def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish, labels: Sequence[str]) -> Iterator[dict[str, str]]:
     order = sorted(labels, key=lambda label: SHOWN_LAST.index(label) if label in SHOWN_LAST else -1)
     worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
     for utterance_id in track(wish.shown or typical(result), "pictures"):
@@ -166,7 +193,7 @@ def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish) -> I
             "id": utterance_id,
             "text": utterance.speech.text,
             "emotion": utterance.emotion,
-            "trajectories": trajectory_figure(utterance, drawn, labels),
+            "trajectories": trajectory_figure(utterance, drawn, list(labels)),
             "video": _video(utterance_id, corpus, dict(islice(motions.items(), MOST_PANELS)), face, worst) if wish.videos else "",
         }
 

@@ -13,6 +13,8 @@ from facesynth.evaluation.table import short_number
 
 MEAN_FACE = "mean face"
 FIGURES = ("marker_error", "lve")
+HARDLY = 0.98
+"""Movement at its best size that leaves more than this share of the error of standing still brings next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,8 @@ class Verdict:
     good: bool
     """Better than the mean face by marker error and by lip error, on average."""
     text: str
+    unsure: tuple[str, ...]
+    """Figures by which it is not told apart from the mean face."""
 
 
 def verdicts(result: Evaluation) -> list[Verdict]:
@@ -34,7 +38,7 @@ def verdicts(result: Evaluation) -> list[Verdict]:
 
 
 def _verdict(result: Evaluation, label: str) -> Verdict:
-    scores, parts, lost = result.comparison.scores, [], []
+    scores, parts, lost, unsure = result.comparison.scores, [], [], []
     units = {column.name: column.unit for column in result.comparison.columns}
     for figure in FIGURES:
         mine, still = scores[label][figure], scores[MEAN_FACE][figure]
@@ -44,13 +48,14 @@ def _verdict(result: Evaluation, label: str) -> Verdict:
         if mine.mean >= still.mean:
             way = "MORE"
             lost.append(figure)
-        sure = _sure(result.differences, label, figure)
+        if not _sure(result.differences, label, figure):
+            unsure.append(figure)
         parts.append(
             f"{figure} {short_number(mine.mean)} {units[figure]}, {way} than the mean face's {short_number(still.mean)}"
-            f" ({'told apart' if sure else 'not told apart'})"
+            f" ({'not told apart' if figure in unsure else 'told apart'})"
         )
     why = " ".join(["", *reasons(result, label, lost)]) if lost else ""
-    return Verdict(label, not lost, f"{'; '.join(parts)}.{why}")
+    return Verdict(label, not lost, f"{'; '.join(parts)}.{why}", tuple(unsure))
 
 
 def reasons(result: Evaluation, label: str, lost: Sequence[str]) -> list[str]:
@@ -77,8 +82,8 @@ def _movement(trade: Sequence[Point]) -> str:
     """`trade` by rising gain."""
     whole, best = next(point for point in trade if point.gain == 1.0), min(trade, key=lambda point: point.lve)
     words = f"It moves {short_number(whole.energy_ratio)} times as much as recorded"
-    if best.gain == 0:
-        return f"{words}, and any part of that movement adds to the error: it does not follow the recorded one."
+    if best.lve > HARDLY * trade[0].lve:
+        return f"{words}, and next to nothing of that movement follows the recorded one."
     if best.gain < 1:
         nearest = f"nearest ({short_number(best.lve)}) moving {best.gain:g} times as far"
         return f"{words}, and would be {nearest}: it follows the recorded movement in part."

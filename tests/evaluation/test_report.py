@@ -8,12 +8,14 @@ import pytest
 from corpora import tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
+from facesynth.evaluation import report
 from facesynth.evaluation.compare import evaluate
 from facesynth.evaluation.contestants import Contestant, Family
 from facesynth.evaluation.exports import escape
 from facesynth.evaluation.folds import make_folds
+from facesynth.evaluation.paired import tallied
 from facesynth.evaluation.point_face import PointFace
-from facesynth.evaluation.report import PAGE, Wish, typical, write_report
+from facesynth.evaluation.report import PAGE, Wish, pictured_rows, typical, write_report
 from facesynth.evaluation.verdict import verdicts
 from facesynth.face.video import read_video
 from facesynth.methods.baselines.mean_face import MeanFace
@@ -93,13 +95,26 @@ def test_variants_of_one_method_are_one_curve(folder, page):
     assert "least lve at energy 0.9 to 1.1" in page
 
 
+def test_many_rows_are_counted_and_only_the_first_of_each_family_is_drawn(result, corpus, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "MOST_IN_WORDS", 3)
+    assert pictured_rows(result.comparison, [FAMILY, CURVE]) == ["second take", "phone mean", "mean face"]
+    text = write_report(tmp_path, result, corpus, [FAMILY], Wish("Tiny", videos=False)).read_text(encoding="utf-8")
+    assert "<summary>In words</summary>" in text
+    assert "only the first variant of each family is drawn" in text
+    assert "Better by both marker_error and lve" in text
+    counts = tallied(result.differences)
+    for figure in {one.figure for one in result.differences}:
+        won, lost = (sum(of.get(figure, (0, 0))[k] for of in counts.values()) for k in (0, 1))
+        assert won == lost == sum(one.distinguishable for one in result.differences if one.figure == figure)
+
+
 def test_a_method_that_loses_to_the_mean_face_is_named_with_the_reason(result, page):
     said = {one.label: one for one in verdicts(result)}
     assert said["phone mean"].good
     assert not said["wrong"].good
     assert "MORE than the mean face" in said["wrong"].text
     assert "is no nearer to the recording than the mean of all recordings" in said["wrong"].text
-    assert "any part of that movement adds to the error" in said["wrong"].text
+    assert "next to nothing of that movement follows the recorded one" in said["wrong"].text
     assert "NOT better than the mean face" in page
 
 

@@ -27,6 +27,13 @@ CHAPTERS = (
     ("eyes", "fig. 3.8", "user ratings, ANOVA", "p = 2.4e-10"),
 )
 """Method, place, what, figure: of the dissertation's other chapters."""
+MISSING = {
+    "coarticulation": "co-articulation model",
+    "maps": "maps of phonemes",
+    "head": "method for head motion",
+    "eyes": "method for eye motion",
+}
+"""What a method is called where it does not exist."""
 
 
 def findings(material: Material) -> list[Finding]:
@@ -63,7 +70,7 @@ def missing() -> list[Finding]:
     """Chapters whose methods this version lacks."""
     known = set(list_methods())
     return [
-        not_implemented(where, what, paper, f"this version has no {method}")
+        not_implemented(where, what, paper, f"this version has no {MISSING[method]}")
         for method, where, what, paper in CHAPTERS
         if method not in known
     ]
