@@ -143,9 +143,9 @@ def _by_emotion(comparison: Comparison, columns: Sequence[str], labels: Sequence
 def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[str, Any]:
     """The picture of all curves, and for each curve the nearest and the best lively point by both errors.
 
-    Variants of a family that is no single method have a picture of their own, and would only crowd this one.
+    Of a family that is no single method only the first variant is here: the others have a picture of their own.
     """
-    crowd = {label for family in families if not family.curve for label in family.labels}
+    crowd = {label for family in families if not family.curve for label in family.labels[1:]}
     curves = [curve for curve in result.curves(families) if curve.label not in crowd]
     references = (*REFERENCES, SECOND_TAKE)
     rows = [

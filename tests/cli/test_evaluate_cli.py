@@ -7,6 +7,7 @@ from corpora import tiny_corpus
 from facesynth.cli.evaluate import evaluate
 from facesynth.cli.reproduce import reproduce
 from facesynth.errors import FacesynthError
+from facesynth.evaluation import jobs
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +22,12 @@ def family(tmp_path_factory):
         "title: Phone means\nmethod: phone_mean\naxis: minutes\nvariants: {few: {minutes: 0.05}, many: {minutes: 9}}\n"
     )
     return path
+
+
+@pytest.fixture(autouse=True)
+def no_process_for_memory(monkeypatch):
+    """Each takes seconds."""
+    monkeypatch.setattr(jobs, "peak_speaking_mb", lambda *_: None)
 
 
 def run(*arguments, command=evaluate):
