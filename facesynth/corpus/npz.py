@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +15,11 @@ from facesynth.errors import FacesynthError
 
 LARGEST_BYTES = 2**31
 ARRAYS = ("frames", "head", "eyes", "fps")
+DAMAGE = (
+    *(OSError, ValueError, EOFError, LookupError, TypeError, AttributeError, MemoryError, RuntimeError, ArithmeticError),
+    *(SyntaxError, tokenize.TokenError, struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What reading a damaged archive, or a damaged array in it, can end in."""
 
 
 def read_npz(path: Path) -> dict[str, Any]:
@@ -22,7 +30,7 @@ def read_npz(path: Path) -> dict[str, Any]:
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             arrays: dict[str, Any] = {name: stored[name] for name in ARRAYS if name in stored}
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, MemoryError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise FacesynthError(f"{path} is not a motion file, or is damaged ({error}); write it again with numpy.savez") from None
     if "frames" not in arrays:
         raise FacesynthError(f"{path} holds no array 'frames'; write it with numpy.savez(file, frames=…, fps=…)")
@@ -36,7 +44,7 @@ def require_modest(path: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
-    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError):
+    except DAMAGE:
         return
     if size > LARGEST_BYTES:
         raise FacesynthError(f"{path} would unpack to {size / 1e9:.1f} GB, more than one recording can be; split it")
