@@ -37,7 +37,7 @@ def family_figure(comparison: Comparison, family: Family) -> str:
         unit = next(column.unit for column in comparison.columns if column.name == name)
         axis.set_title(name if unit == "1" else f"{name} ({unit})", fontsize=9)
         if places is None:
-            _lines(axis, scores, labels)
+            _lines(axis, scores, labels, from_zero=asked in TIMES)
         else:
             _curve(axis, scores, places, from_zero=asked in TIMES)
             axis.set_xlabel("minutes learned from" if family.axis == "minutes" else family.axis)
@@ -67,10 +67,13 @@ def _curve(axis: Axes, scores: Sequence[Score], places: Sequence[float], *, from
         axis.set_ylim(0, None)
 
 
-def _lines(axis: Axes, scores: Sequence[Score], labels: Sequence[str]) -> None:
+def _lines(axis: Axes, scores: Sequence[Score], labels: Sequence[str], *, from_zero: bool) -> None:
     rows = np.arange(len(labels))
     means, low, high = (np.array([getattr(s, side) for s in scores]) for side in ("mean", "low", "high"))
     axis.errorbar(means, rows, xerr=[means - low, high - means], fmt="o", color=COLOURS[0], markersize=4, linewidth=1)
     axis.axvline(means[0], color="#cccccc", linewidth=0.8, zorder=0)
+    if from_zero:
+        axis.set_xlim(0, None)
+    axis.locator_params(axis="x", nbins=5)
     axis.set_yticks(rows, labels, fontsize=8)
     axis.set_ylim(len(labels) - 0.5, -0.5)
