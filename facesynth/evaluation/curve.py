@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facesynth.evaluation.contestants import SECOND_TAKE, Family
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, lve_centred
-from facesynth.evaluation.pair import Array
+from facesynth.evaluation.pair import Array, UnavailableError, require_alike
 from facesynth.evaluation.regions import lip_points
 from facesynth.methods.efase.sharpening import sharpen
 from facesynth.motion.layout import Layout
@@ -102,20 +102,26 @@ def compromises(made: Motion, truth: Motion) -> Array:
     Two sharpened motions tell all: `sharpen` is linear in its share. Speeds, and so both energies, are proportional to
     the gain. UnavailableError where a figure has no value.
     """
+    require_alike(made, truth)
     lips = lip_points(truth.layout)
-    lips_truth, frames = _lips(truth, lips), made.frames.astype(np.float64)
-    once, twice = (sharpen(frames, share, made.fps) for share in (1.0, 2.0))
-    mean = frames.mean(axis=0)
-    rows: list[tuple[float, float, float, float]] = []
+    lips_truth, frames = _lips(truth, truth.points, lips), made.frames.astype(np.float64)
+    once, twice = (made.layout.points(sharpen(frames, share, made.fps)) for share in (1.0, 2.0))
+    points, recorded = made.layout.points(frames), truth.points.astype(np.float64)
+    moving = np.asarray(~np.isnan(np.diff(recorded, axis=0)).any(axis=2))
+    speed = _speed(recorded, moving) if moving.any() else 0.0
+    if not speed > 0:
+        raise UnavailableError("the motion to compare with does not move")
+    mouth, rows = points[:, lips], list[tuple[float, ...]]()
     for gain, share in VARIATIONS:
-        changed = frames if share == 0 else once + (share - 1) * (twice - once)
-        variant = replace(made, frames=(mean + gain * (changed - mean) if gain != 1 else changed).astype(np.float32))
-        lips_made = _lips(variant, lips)
-        errors = lve(lips_made, lips_truth), lve_centred(lips_made, lips_truth)
         if gain == 1:
-            rows.append((energy_ratio(variant, truth), energy_ratio(lips_made, lips_truth), *errors))
+            changed = points if share == 0 else once + (share - 1) * (twice - once)
+            lips_made = _lips(made, changed, lips)
+            energies = _speed(changed, moving) / speed, energy_ratio(lips_made, lips_truth)
         else:
-            rows.append((gain * rows[0][0], gain * rows[0][1], *errors))
+            mean = mouth.mean(axis=0)
+            lips_made = _lips(made, mean + gain * (mouth - mean), np.arange(len(lips)))
+            energies = gain * rows[0][0], gain * rows[0][1]
+        rows.append((*energies, lve(lips_made, lips_truth), lve_centred(lips_made, lips_truth)))
     return np.array(rows)
 
 
@@ -148,12 +154,17 @@ def _curve(name: str, settings: Sequence[tuple[str, Sequence[Point]]]) -> Curve:
     return Curve(name, own, tuple(p for p in named if p.gain != 1 and name != SECOND_TAKE))
 
 
-def _lips(motion: Motion, lips: NDArray[np.int64]) -> Motion:
-    """The lip points alone."""
-    layout, chosen = motion.layout, motion.points[:, lips]
-    names = tuple(layout.names[int(i)] for i in lips)
-    mouth = Layout(layout.kind, names, {"mouth": tuple(range(len(names)))})
-    return Motion(chosen.reshape(len(motion), -1), motion.fps, mouth)
+def _lips(motion: Motion, points: NDArray[np.floating], lips: NDArray[np.int64]) -> Motion:
+    """The lip points alone, of a motion whose points [T, K, dimension] were changed."""
+    names = tuple(f"lip {k}" for k in range(len(lips)))
+    mouth = Layout(motion.layout.kind, names, {"mouth": tuple(range(len(names)))})
+    return Motion(points[:, lips].reshape(len(motion), -1).astype(np.float32), motion.fps, mouth)
+
+
+def _speed(points: Array, moving: NDArray[np.bool_]) -> float:
+    """Mean speed (unit of the layout a frame) where the truth has both frames."""
+    steps = np.diff(points, axis=0)[moving]
+    return float(np.sqrt(np.einsum("nd,nd->n", steps, steps)).mean())
 
 
 def _beats(one: Point, other: Point, measure: Measure) -> bool:
