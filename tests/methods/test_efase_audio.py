@@ -15,7 +15,7 @@ from facesynth.errors import FacesynthError
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
 from facesynth.methods.efase import descent, prediction
-from facesynth.methods.efase.audio import sound_distances
+from facesynth.methods.efase.audio import pose_costs, pose_distances, sound_distances
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
 from facesynth.methods.efase.descent import Logs, descend
 from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error
@@ -78,6 +78,14 @@ def test_the_pose_term_draws_motion_to_what_is_expected(hearing, speech):
     assert distance(100.0) < distance(1e-6)
 
 
+@pytest.mark.parametrize("count", [1, 2, 5, 40])
+def test_pose_costs_of_all_nodes_are_those_of_stretched_motion(hearing, count):
+    nodes, rng = hearing.nodes(), np.random.default_rng(count)
+    poses, metric = rng.normal(size=(count, nodes.frames.shape[1])), rng.uniform(0, 2, nodes.frames.shape[1])
+    wanted = pose_distances(nodes, np.arange(len(nodes)), poses) @ metric
+    np.testing.assert_allclose(pose_costs(nodes.frames, nodes.starts, nodes.lengths, poses, metric), wanted, rtol=1e-9)
+
+
 def test_silence_follows_what_is_expected_without_a_jump(hearing):
     nodes = hearing.nodes()
     rng = np.random.default_rng(0)
@@ -134,6 +142,7 @@ def test_sharpening_adds_motion_and_leaves_a_held_pose(hearing, halves, speech):
 
 def test_the_gradient_of_the_error_is_that_of_small_steps(hearing, halves):
     lattices, logs = lattices_of(hearing, next(iter(halves[1]))), logs_of(hearing)
+    lattices[0].truth[3:6] = torch.nan  # a gap
     mean_error(lattices, logs).backward()
     moved = [(logs.numbers, place) for place in np.flatnonzero(logs.used)]
     moved += [(logs.factors["sound"], 0), (logs.factors["sound"], 3), (logs.factors["pose"], 0), (logs.factors["pose"], 1)]
@@ -181,7 +190,10 @@ def test_the_parts_share_no_sentence(halves):
     assert [part.ids for part in again] == [part.ids for part in descent.three_parts(corpus, 3)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(descent, "MOST", 1)
-        assert [len({key[i] for i in part.ids}) for part in descent.three_parts(corpus, 3)][1:] == [1, 1]
+        some = descent.three_parts(corpus, 3)
+        assert [len(part.ids) for part in some][1:] == [1, 1]
+        assert len({key[i] for i in some[0].ids} | {key[i] for part in some[1:] for i in part.ids}) == len(set(key.values()))
+        assert not {key[i] for i in some[0].ids} & {key[i] for part in some[1:] for i in part.ids}
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from facesynth.methods.anime_graph.candidates import stretched_motions
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import lay_steps
 from facesynth.methods.anime_graph.soft import step_terms
-from facesynth.methods.efase.descent import Logs, descend, three_parts, with_gaps
-from facesynth.methods.efase.sharpening import matching_share, sharpening_matrix
+from facesynth.methods.efase.descent import Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.efase.sharpening import matching_share
 from facesynth.methods.efase.soft import posterior
 from facesynth.progress import track
 
@@ -69,8 +69,6 @@ class Lattice:
     """P - 1 of [n, n'] distance of the frames that meet there."""
     truth: Tensor
     """[T, D] what was recorded, NaN in gaps."""
-    sharp: Tensor
-    """[T, T] what sharpening does to T frames."""
 
 
 def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> Learned:
@@ -96,7 +94,7 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
 
 
 def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> Tensor:
-    """Mean over frames of ‖sharpened posterior mean - truth‖², differentiable in the weights."""
+    """Mean over frames of ‖posterior mean - truth‖², differentiable in the weights."""
     total, count, values = torch.zeros((), dtype=torch.float64), 0, logs.values()
     for lattice in lattices:
         moves = zip(lattice.jumps, lattice.apart, strict=True)
@@ -106,9 +104,8 @@ def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> T
             temperature,
         )
         means = [torch.tensordot(shares, motion, 1) for shares, motion in zip(found.nodes, lattice.motion, strict=True)]
-        error = (lattice.sharp @ torch.cat(means) - lattice.truth).square().sum(dim=1)
-        present = torch.isfinite(error)
-        total, count = total + error[present].sum(), count + int(present.sum())
+        error, frames = squared_error(torch.cat(means), lattice.truth)
+        total, count = total + error, count + frames
     return total / max(count, 1)
 
 
@@ -127,7 +124,6 @@ def lattice_of(model: AnimeGraph, utterance: Utterance) -> Lattice:
         _tensors(jumps for jumps, _ in terms),
         _tensors(apart for _, apart in terms),
         with_gaps(model.in_metric(torch.from_numpy(utterance.motion.frames)), count),
-        sharpening_matrix(count, model.config["sharpening"], model.fps),
     )
 
 

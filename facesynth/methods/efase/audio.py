@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from numba import njit
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
@@ -136,10 +137,10 @@ class AudioTerms(nn.Module):
                 expected.sounds[spoken], self.sound.nodes.cpu().numpy().astype(np.float64)
             )
         if self.predictor is not None and expected.poses is not None:
-            metric, everything = self.predictor.metric.cpu().numpy().astype(np.float64), np.arange(len(nodes))
+            metric = self.predictor.metric.cpu().numpy().astype(np.float64)
             for t in np.flatnonzero(spoken & (np.diff(bounds) > 0)):
-                distances = pose_distances(nodes, everything, expected.poses[bounds[t] : bounds[t + 1]])
-                total[t] += pose_weight * (distances @ metric)
+                poses = np.ascontiguousarray(expected.poses[bounds[t] : bounds[t + 1]])
+                total[t] += pose_weight * pose_costs(nodes.frames, nodes.starts, nodes.lengths, poses, metric)
         return total
 
     def hear(self, speech: Speech, emotions: Ints, emotion_count: int, fps: float, count: int) -> Expected:
@@ -158,3 +159,22 @@ def sound_distances(sounds: Floats, nodes: Floats) -> Floats:
 def pose_distances(nodes: MotionNodes, which: Ints, poses: Floats) -> Floats:
     """[n, D] for each coordinate the mean over the frames of poses [L, D] of (pose - node)², of the nodes `which`."""
     return np.asarray(((stretched(nodes, which, len(poses)) - poses) ** 2).mean(axis=1))
+
+
+@njit(cache=True)
+def pose_costs(frames, starts, lengths, poses, metric):  # type: ignore[no-untyped-def]
+    """[N] `pose_distances` of all nodes times metric [D], without the stretched motions ever being in memory."""
+    count, width = poses.shape
+    costs = np.zeros(len(starts))
+    for n in range(len(starts)):
+        last = lengths[n] - 1
+        for k in range(count):
+            place = 0.5 * last if count == 1 else last * k / (count - 1)
+            low = min(int(place), max(last - 1, 0))
+            part = place - low
+            a, b = starts[n] + low, starts[n] + min(low + 1, last)
+            for d in range(width):
+                difference = frames[a, d] * (1 - part) + frames[b, d] * part - poses[k, d]
+                costs[n] += metric[d] * difference * difference
+        costs[n] /= count
+    return costs

@@ -20,7 +20,7 @@ from facesynth.progress import track
 DATABASE_SHARE, LEARN_SHARE = 0.7, 0.2
 """Of the sentences; the rest decides when to stop."""
 MOST = 60
-"""More sentences than this are neither learned from nor stopped by; they stay in the database."""
+"""Utterances that are learned from, and that are stopped by; sentences beyond them stay in the database."""
 FEWEST = 10
 """Sentences that can be parted so; of a corpus with fewer, utterances are."""
 LEARNING_RATE, BATCH = 0.05, 8
@@ -117,11 +117,18 @@ def three_parts(corpus: Corpus, seed: int) -> tuple[Corpus, Corpus, Corpus]:
             "record more, or set learn=false"
         )
     shuffled = np.random.default_rng(seed).permutation(np.array(sentences, object))
-    stop = len(sentences) - min(MOST, len(sentences) - round((DATABASE_SHARE + LEARN_SHARE) * len(sentences)))
-    cuts = [stop - min(MOST, round(LEARN_SHARE * len(sentences))), stop]
-    parts = [set(group) for group in np.split(shuffled, cuts)]
-    database, examples, others = (corpus.subset([r.id for r in records if keys[r.id] in part]) for part in parts)
-    return database, examples, others
+    cuts = [round(DATABASE_SHARE * len(sentences)), round((DATABASE_SHARE + LEARN_SHARE) * len(sentences))]
+    parts = [[record.id for key in part for record in records if keys[record.id] == key] for part in np.split(shuffled, cuts)]
+    database, examples, others = parts[0], parts[1][:MOST], parts[2][:MOST]
+    held_out = {keys[number] for number in examples + others}
+    database += [number for part in parts[1:] for number in part if keys[number] not in held_out]
+    return corpus.subset(database), corpus.subset(examples), corpus.subset(others)
+
+
+def squared_error(made: Tensor, recorded: Tensor) -> tuple[Tensor, int]:
+    """‖made - recorded‖², both [T, D], summed over the frames without gaps, and how many these are."""
+    present = torch.isfinite(recorded).all(dim=1)
+    return (made[present] - recorded[present]).square().sum(), int(present.sum())
 
 
 def with_gaps(recorded: Tensor, count: int) -> Tensor:

@@ -21,12 +21,12 @@ from facesynth.corpus import Corpus, Utterance
 from facesynth.errors import FacesynthError
 from facesynth.methods.efase.audio import pose_distances
 from facesynth.methods.efase.costs import Query, target_costs
-from facesynth.methods.efase.descent import Logs, descend, three_parts, with_gaps
+from facesynth.methods.efase.descent import Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import part, stretches
-from facesynth.methods.efase.sharpening import matching_share, sharpening_matrix
+from facesynth.methods.efase.sharpening import matching_share
 from facesynth.methods.efase.soft import candidates, posterior
 from facesynth.methods.efase.steps import CostWeights, StepTerms, step_terms, stretched
 from facesynth.motion.resample import resample
@@ -83,8 +83,6 @@ class Lattice:
     steps: Sequence[StepTerms]
     truth: Tensor
     """[T, D] what was recorded, NaN in gaps."""
-    sharp: Tensor
-    """[T, T] what sharpening does to T frames."""
 
 
 def logs_of(model: Efase) -> Logs:
@@ -139,23 +137,21 @@ def lattices_of(model: Efase, utterance: Utterance) -> list[Lattice]:
                 [_place(model, asked, t, *row) for t, row in enumerate(rows)],
                 [step_terms(model.nodes(), i, j) for i, j in pairwise(chosen)],
                 recorded,
-                sharpening_matrix(len(recorded), model.config["sharpening"], fps),
             )
         )
     return made
 
 
 def mean_error(lattices: Sequence[Lattice], logs: Logs) -> Tensor:
-    """Mean over frames of ‖sharpened posterior mean - truth‖², differentiable."""
+    """Mean over frames of ‖posterior mean - truth‖², differentiable."""
     total, count, values = torch.zeros((), dtype=torch.float64), 0, logs.values()
     weights = CostWeights(*(values[name] for name in ("pnt", "alpha", "beta", "eta")))
     for lattice in lattices:
         targets = [_target(place, values, logs.factor("sound"), logs.factor("pose")) for place in lattice.places]
         found = posterior(targets, [step.cost(weights) for step in lattice.steps], values["temperature"])
         means = [torch.tensordot(shares, p.motion, 1) for p, shares in zip(lattice.places, found.nodes, strict=True)]
-        error = (lattice.sharp @ torch.cat(means) - lattice.truth).square().sum(dim=1)
-        present = torch.isfinite(error)
-        total, count = total + error[present].sum(), count + int(present.sum())
+        error, frames = squared_error(torch.cat(means), lattice.truth)
+        total, count = total + error, count + frames
     return total / max(count, 1)
 
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import torch
 from scipy.ndimage import gaussian_filter1d
-from torch import Tensor
 
 from facesynth.methods.efase.nodes import Floats
 from facesynth.motion.motion import Motion
@@ -30,11 +28,6 @@ def sharpen(frames: Floats, share: float, fps: float) -> Floats:
         return frames
     smooth = _smooth(frames, fps)
     return smooth + share * (smooth - gaussian_filter1d(smooth, QUICK_S * fps, axis=0, mode="nearest"))
-
-
-def sharpening_matrix(count: int, share: float, fps: float) -> Tensor:
-    """[count, count] what `sharpen` multiplies that many frames by."""
-    return torch.from_numpy(sharpen(np.eye(count), share, fps))
 
 
 def matching_share(pairs: Iterable[tuple[Motion, Motion]]) -> float:
