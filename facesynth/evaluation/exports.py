@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from facesynth.atomic import write_text
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import Family
@@ -37,6 +39,8 @@ def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) 
         "emotions.csv": emotions_csv(comparison, result.main_columns()),
         "points.csv": points_csv(result),
         "trade.csv": trade_csv(curves),
+        "residuals.csv": residuals_csv(result.details),
+        "confusions.csv": confusions_csv(comparison),
         "report.json": report_json(result, families, curves),
     }
     for name, text in texts.items():
@@ -112,6 +116,28 @@ def trade_csv(curves: Sequence[Curve]) -> str:
     """A line for each point of each curve of error against movement."""
     rows = [row for curve in curves for row in curve.rows()]
     return to_csv([tuple(rows[0]), *([_cell(value) for value in row.values()] for row in rows)] if rows else [])
+
+
+def residuals_csv(details: Mapping[str, Details]) -> str:
+    """The histograms of lip residuals: the share of each bin, by its middle."""
+    lines = []
+    for label, one in details.items():
+        edges = np.linspace(-one.histogram_reach, one.histogram_reach, len(one.histogram) + 1)
+        bins = zip((edges[1:] + edges[:-1]) / 2, one.histogram, strict=True)
+        lines += [(label, plain(float(middle)), plain(float(share))) for middle, share in bins]
+    return to_csv([("method", "residual", "share"), *lines])
+
+
+def confusions_csv(comparison: Comparison) -> str:
+    """Which emotion was asked and which recognised, how often; of the recordings too."""
+    matrices = {"recorded": comparison.recorded_emotions, **{row.label: row.confusion for row in comparison.rows}}
+    lines = [
+        (label, matrix.emotions[i], matrix.emotions[j], int(count))
+        for label, matrix in matrices.items()
+        if matrix is not None
+        for (i, j), count in np.ndenumerate(matrix.counts)
+    ]
+    return to_csv([("method", "asked", "recognised", "utterances"), *lines])
 
 
 def report_json(result: Evaluation, families: Sequence[Family], curves: Sequence[Curve]) -> str:

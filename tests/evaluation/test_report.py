@@ -23,7 +23,10 @@ from facesynth.methods.registry import register
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
-FILES = "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv report.json"
+FILES = (
+    "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv residuals.csv "
+    "confusions.csv report.json"
+)
 FAMILY = Family("By minutes", ("phone mean", "little"), "minutes", (9.0, 0.05))
 CURVE = Family("By what it holds", ("mean face", "wrong"), curve="still faces")
 
@@ -132,6 +135,13 @@ def test_the_same_figures_as_files(folder, result, page):
     assert whole["made_of"]["little"][0]["train_minutes"] < whole["made_of"]["phone mean"][0]["train_minutes"]
     lines = list(csv.DictReader(io.StringIO((folder / "utterances.csv").read_text())))
     assert len(lines) == 5 * len(result.comparison.utterances)
+    shares = list(csv.DictReader(io.StringIO((folder / "residuals.csv").read_text())))
+    assert sum(float(line["share"]) for line in shares if line["method"] == "little") == pytest.approx(1)
+    asked = list(csv.DictReader(io.StringIO((folder / "confusions.csv").read_text())))
+    counted = {
+        label: sum(int(line["utterances"]) for line in asked if line["method"] == label) for label in ("recorded", "little")
+    }
+    assert counted == dict.fromkeys(counted, len(result.comparison.utterances))
     mean = np.mean([float(line["lve"]) for line in lines if line["method"] == "little"])
     assert mean == pytest.approx(result.comparison.scores["little"]["lve"].mean, rel=1e-6)
 
