@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
@@ -36,6 +37,8 @@ STORED = 2
 SAMPLES, SAMPLED = 10, 20
 """A method that draws makes so many motions of each of so many of a fold's utterances."""
 WARM_UTTERANCES = 6
+BRIEF: Mapping[str, Any] = {"steps": 1, "learn": False}
+"""Settings with which a method that has them learns briefly."""
 _warm: set[str] = set()
 """Methods that this process has trained and heard before."""
 
@@ -139,9 +142,10 @@ def _warm_up(job: Job, few: Corpus) -> None:
     if name in _warm:
         return
     _warm.add(name)
-    settings = dict(job.contestant.create().config)
+    settings = job.contestant.create().config
+    brief = {key: value for key, value in BRIEF.items() if key in settings}
     with suppress(FacesynthError):  # so little may be too little, and then there is little to warm
-        create(name, **settings | ({"steps": 1} if "steps" in settings else {})).fit(few, seed=job.seed)
+        create(name, **{**settings, **brief}).fit(few, seed=job.seed)
 
 
 def _speak(job: Job, corpus: Corpus, method: Method) -> None:

@@ -106,6 +106,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "shown": list(_shown(result, corpus, face, wish, pictured)),
         "provenance": comparison.provenance,
         "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
+        "sources": len({one["versions"]["source"] for accounts in result.accounts.values() for one in accounts}),
         "definitions": {m.name: " ".join(m.definition.split()) for m in METRICS},
         "unit": unit,
     }

@@ -7,6 +7,7 @@ from facesynth.errors import FacesynthError
 from facesynth.evaluation import variety
 from facesynth.evaluation.head import head_cca, head_distance
 from facesynth.evaluation.pair import UnavailableError
+from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
 
@@ -67,3 +68,50 @@ def test_diversity_of_known_offsets_and_errors_of_the_mean_and_the_best():
     assert variety.error_of_best(samples, truth) == pytest.approx(1, rel=1e-4)
     with pytest.raises(FacesynthError, match="two samples"):
         variety.diversity(samples[:1])
+
+
+def drawn(size, seeds=4, motion=None):
+    truth = motion or talk()
+    return [
+        moved(truth, truth.frames + size * np.random.default_rng(seed).normal(size=truth.frames.shape)) for seed in range(seeds)
+    ]
+
+
+def test_the_same_motion_over_and_over_has_no_diversity_and_the_error_of_one():
+    samples = [talk(delay_s=0.05)] * 3
+    assert variety.diversity(samples) == 0
+    alone = metric_of(samples[0])
+    assert variety.error_of_mean(samples, talk()) == pytest.approx(alone)
+    assert variety.error_of_best(samples, talk()) == pytest.approx(alone)
+
+
+def metric_of(motion):
+    return float(np.linalg.norm(motion.points - talk().points, axis=2).mean())
+
+
+def test_more_noise_is_more_diversity_and_a_mean_worse_by_the_root_of_their_number():
+    sizes = (0.1, 0.2, 0.4, 0.8)
+    assert np.all(np.diff([variety.diversity(drawn(size)) for size in sizes]) > 0)
+    assert np.all(np.diff([variety.error_of_mean(drawn(size), talk()) for size in sizes]) > 0)
+    noise = np.sqrt(8 / np.pi)  # mean length of three normal numbers
+    samples = drawn(1.0, seeds=16)
+    assert variety.diversity(samples) == pytest.approx(noise * np.sqrt(2), rel=0.02)
+    assert variety.error_of_mean(samples, talk()) == pytest.approx(noise / 4, rel=0.02)
+    assert variety.error_of_best(samples, talk()) == pytest.approx(noise, rel=0.02)
+
+
+@pytest.mark.parametrize("fault", ["length", "rate", "layout"])
+def test_samples_that_do_not_match_are_refused(fault):
+    motion = talk()
+    names = tuple(reversed(motion.layout.names))
+    layout = Layout(motion.layout.kind, names, motion.layout.groups, motion.layout.lip_pairs, motion.layout.neutral)
+    other = {
+        "length": Motion(motion.frames[:-1], motion.fps, motion.layout),
+        "rate": Motion(motion.frames, 25.0, motion.layout),
+        "layout": Motion(motion.frames, motion.fps, layout),
+    }[fault]
+    with pytest.raises(FacesynthError):
+        variety.diversity([motion, other])
+    for measure in (variety.error_of_mean, variety.error_of_best):
+        with pytest.raises(FacesynthError):
+            measure([motion, other], motion)

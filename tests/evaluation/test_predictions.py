@@ -3,7 +3,15 @@ import pytest
 from talking_points import talk
 
 from facesynth.errors import FacesynthError
-from facesynth.evaluation.predictions import load_prediction, save_prediction
+from facesynth.evaluation.predictions import (
+    Beside,
+    load_prediction,
+    read_beside,
+    sample_path,
+    sample_paths,
+    save_prediction,
+    write_beside,
+)
 from facesynth.motion.motion import Motion
 
 
@@ -49,3 +57,25 @@ def test_other_files_are_refused_in_one_line(tmp_path, fault):
     with pytest.raises(FacesynthError, match=r"p\.npz is no prediction") as caught:
         load_prediction(path)
     assert "\n" not in str(caught.value)
+
+
+def test_what_lies_beside_comes_back_and_the_processor_s_time_may_be_unknown(tmp_path):
+    path = tmp_path / "u.npz"
+    assert read_beside(path) is None
+    for beside in (Beside(0.5, 2.0, (3, 9), {"shares": 0.25}, 0.125), Beside(0.5, 2.0)):
+        write_beside(path, beside)
+        assert read_beside(path) == beside
+    path.with_suffix(".json").write_text('{"synthesis_s": 1, "speech_s": 2}')
+    assert read_beside(path) == Beside(1.0, 2.0)
+    path.with_suffix(".json").write_text('{"speech_s": 2}')
+    with pytest.raises(FacesynthError, match=r"u\.json tells nothing"):
+        read_beside(path)
+
+
+def test_other_motions_of_an_utterance_lie_in_numbered_folders(tmp_path):
+    path = tmp_path / "u.npz"
+    assert sample_paths(path) == []
+    for number in (2, 1):
+        save_prediction(sample_path(path, number), "u", talk())
+    (tmp_path / "samples" / "3").mkdir()
+    assert sample_paths(path) == [tmp_path / "samples" / "1" / "u.npz", tmp_path / "samples" / "2" / "u.npz"]
