@@ -42,7 +42,7 @@ def findings(material: Material) -> list[Finding]:
             "§4",
             "largest modulus of an eigenvalue (below 1: stable)",
             "below 1",
-            f"{max(poles):.3f}",
+            f"{max(poles):.6f}",
             True,
             "a property, not a measurement",
         )
