@@ -185,3 +185,5 @@ def test_the_shipped_soft_settings(repository):
     config = AnimeGraph.from_config(load_config(repository / "configs" / "anime_graph_soft.yaml")).config
     assert min(config["temperature"], config["pose_weight"], config["sharpening"]) > 0
     assert config["learn"]
+    still = AnimeGraph.from_config(load_config(repository / "configs" / "anime_graph_soft_still.yaml")).config
+    assert still == {**config, "sharpening": 0.0}
