@@ -19,7 +19,7 @@ from facesynth.progress import track
 
 DATABASE_SHARE, LEARN_SHARE = 0.7, 0.2
 """Of the sentences; the rest decides when to stop."""
-MOST = 60
+MOST = 40
 """Utterances that are learned from, and that are stopped by; sentences beyond them stay in the database."""
 FEWEST = 10
 """Sentences that can be parted so; of a corpus with fewer, utterances are."""
