@@ -2,7 +2,7 @@
 
 export async function openFolder(read, ort) {
   const manifest = JSON.parse(new TextDecoder().decode(await read("manifest.json")));
-  if (manifest.written_by !== "facesynth" || manifest.format !== 1) throw new Error("manifest.json was not written by facesynth export");
+  if (manifest.written_by !== "facesynth" || manifest.format !== 2) throw new Error("manifest.json was not written by facesynth export");
   const graphs = {};
   for (const [name, entry] of Object.entries(manifest.graphs)) {
     const content = await read(entry.file);

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,8 @@ from facesynth.errors import FacesynthError
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
-from facesynth.methods.efase.method import NODE_FIELDS, Efase
+from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
+from facesynth.methods.efase.method import Efase
 
 BEYOND_THE_PAPER = ("temperature", "audio_weight", "pose_weight", "sharpening")
 """Settings with which more than the cheapest path is asked for; the runtime has no such search."""
@@ -27,21 +30,22 @@ def efase_content(model: Efase) -> Content:
             f"this eFASE model uses {', '.join(used)}, which cannot be exported; train with {' '.join(f'{n}=0' for n in used)}"
         )
     weights, unit = model.weights(), model.fitted_layout.unit
-    table = model.node_table.cpu().numpy()
-    index = model.index()
-    nearest = np.empty(table.shape[1])
-    nearest[index.forest.order] = index.tables.nearest
-    arrays: dict[str, NDArray[Any]] = {name: table[NODE_FIELDS.index(name)].astype(np.int32) for name in COLUMNS}
+    order = class_order(model.nodes())
+    nodes, names = sorted_nodes(model.nodes(), order), [model.facts["names"][node] for node in order]
+    arrays: dict[str, NDArray[Any]] = {name: getattr(nodes, name).astype(np.int32) for name in COLUMNS}
     arrays |= {
         "node_frames": model.node_frames.cpu().numpy(),
-        "nearest": nearest,
         "rest": model.rest.cpu().numpy(),
-        "names": np.frombuffer("\n".join(model.facts["names"]).encode(), np.uint8),
+        "names": np.frombuffer("\n".join(names).encode(), np.uint8),
     }
     mean, basis = model.pca.mean.cpu().numpy(), model.pca.basis.cpu().numpy()
 
     def decoded(coordinates: NDArray[Any]) -> NDArray[Any]:
         return model.pca.decode(torch.from_numpy(coordinates)).numpy()
+
+    def bounds(kept: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        frames = kept["node_frames"].astype(np.float32) * kept.get("node_frames_scale", np.float32(1))
+        return step_bounds(replace(nodes, frames=frames.astype(np.float64)), weights)
 
     def encoded(frames: NDArray[Any]) -> NDArray[Any]:
         return model.pca.encode(torch.from_numpy(frames)).numpy()
@@ -70,7 +74,14 @@ def efase_content(model: Efase) -> Content:
             "Frames follow 0.4 s after the node that comes after theirs is settled",
         },
         arrays=arrays,
-        units={"node_frames": f"principal components of {unit}", "rest": f"principal components of {unit}", "nearest": "cost"},
+        derived=bounds,
+        units={
+            "node_frames": f"principal components of {unit}",
+            "rest": f"principal components of {unit}",
+            "bounds_in": "cost, logarithmic",
+            "bounds_out": "cost, logarithmic",
+            "bounds_scale": "cost, ratio",
+        },
     )
 
 

@@ -8,7 +8,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from facesynth.export.builder import OPSET
 from facesynth.export.graph import Graph, Parity, check_parity
 from facesynth.progress import track
 
-FORMAT = 1
+FORMAT = 2
 """Of the manifest; a runtime refuses another one."""
 MANIFEST = "manifest.json"
 ARRAYS = "arrays.npz"
@@ -41,6 +41,8 @@ class Content:
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     """Of the arrays."""
+    derived: Callable[[Mapping[str, NDArray[Any]]], Mapping[str, NDArray[Any]]] | None = None
+    """More arrays, which follow from the others as they are stored."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ def write_folder(folder: str | Path, subject: Subject, content: Content) -> dict
     """
     folder = Path(folder)
     _require_free(folder)
+    if content.derived:
+        content = replace(content, arrays={**content.arrays, **content.derived(content.arrays)})
     parities = {graph.name: check_parity(graph) for graph in track(content.graphs, "checking graphs")}
     folder.parent.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=".part-", dir=folder.parent))

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from facesynth_runtime import RuntimeInputError, load
+from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Nodes, Query, Weights
 from facesynth_runtime.efase.search import Search
 from facesynth_runtime.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
@@ -13,11 +14,13 @@ from scipy.signal import butter, sosfiltfilt
 from facesynth.errors import FacesynthError
 from facesynth.export.graph import difference
 from facesynth.export.models import export_model
+from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
 from facesynth.methods.efase.costs import Query as TorchQuery
 from facesynth.methods.efase.costs import Weights as TorchWeights
 from facesynth.methods.efase.costs import path_cost
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import MotionNodes
+from facesynth.methods.efase.plan import part
 from facesynth.methods.efase.search import build_index, search
 from facesynth.speech.speech import EmotionTrack, Speech
 
@@ -59,34 +62,55 @@ def test_the_path_is_that_of_torch_or_a_tie(pair, speeches):
     for speech in speeches:
         wanted, got = model.plan(speech), runtime.plan(speech)
         assert got.cost == pytest.approx(wanted.cost, rel=1e-5, abs=1e-9)
-        assert np.array_equal(got.nodes, wanted.nodes)
+        assert names_of(runtime, got.nodes) == names_of(model, wanted.nodes)
+
+
+def names_of(model, path):
+    names = model.names if hasattr(model, "names") else model.facts["names"]
+    return [names[node] if node >= 0 else None for node in path]
+
+
+OTHERS = [
+    {},  # the published ones
+    {"alpha": 1.042, "beta": 0.3133, "eta": 0.1079, "gamma": 0.3088, "delta": 0.0636, "phi": 0.01373},  # the found ones
+    {"alpha": 0.3, "beta": 20.0, "eta": 0.05, "gamma": 1.0, "delta": 0.03, "phi": 1.0},
+]
+
+
+def runtime_nodes(nodes, weights):
+    columns = (getattr(nodes, name) for name in ("starts", "stops", "phones", "visemes", "emotions", "before"))
+    return Nodes(nodes.frames.astype(np.float32), *columns, weights)
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10_000), pnt=st.sampled_from([0.0, 0.5, 5.0, 500.0]), strict=st.booleans())
-def test_the_search_is_exact_on_random_databases(seed, pnt, strict):
+@given(
+    seed=st.integers(0, 10_000), pnt=st.sampled_from([0.0, 0.5, 5.0, 500.0]), strict=st.booleans(), others=st.sampled_from(OTHERS)
+)
+def test_the_search_is_exact_on_random_databases(seed, pnt, strict, others):
     rng = np.random.default_rng(seed)
     count = int(rng.integers(6, 60))
     lengths = rng.integers(1, 9, count)
-    stops = np.cumsum(lengths)
     phones = rng.integers(0, 5, count)
     before = np.where(rng.random(count) < 0.7, np.arange(count) - 1, -1)
-    pieces = [rng.standard_normal((n, 3)) for n in lengths]
+    pieces = [rng.standard_normal((n, 3)).astype(np.float32) for n in lengths]
     nodes = MotionNodes.from_pieces(pieces, phones, phones // 2, rng.integers(0, 2, count), before)
-    weights = TorchWeights(pnt)
-    index = build_index(nodes, weights)
-    nearest = np.empty(count)
-    nearest[index.forest.order] = index.tables.nearest
+    weights = TorchWeights(pnt, **others)
+    nodes = sorted_nodes(nodes, class_order(nodes))
+    index, bounds = build_index(nodes, weights), step_bounds(nodes, weights)
     own = Weights(pnt, weights.alpha, weights.beta, weights.eta, weights.gamma, weights.delta, weights.phi)
-    table = Nodes(nodes.frames, stops - lengths, stops, phones, phones // 2, nodes.emotions, nodes.before, nearest, own)
+    table = runtime_nodes(nodes, own)
     wanted = rng.integers(0, 5, 8)
-    strictly = np.full(8, strict) & np.isin(wanted // 2, phones // 2)
+    strictly = np.full(8, strict) & np.isin(wanted // 2, nodes.visemes)
     fixed = {3: int(rng.integers(count))} if not strict else {}
     query = TorchQuery(wanted, wanted // 2, rng.integers(-1, 2, 8), fixed, strictly)
     best = search(index, query)
-    quest = Search(table)
+    quest, step_by_step = Search(table, StepBounds(table, bounds)), Search(table, StepBounds(table, bounds))
     for t in range(8):
-        quest.push(Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t])))
+        asked = Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t]))
+        quest.push(asked)
+        step_by_step.push(asked)
+        so_far = part(query, np.arange(t + 1))
+        assert step_by_step.cost(step_by_step.path()) == pytest.approx(search(index, so_far).cost, rel=1e-9, abs=1e-9)
     path = quest.path()
     assert quest.cost(path) == pytest.approx(path_cost(nodes, query, path, weights), rel=1e-9, abs=1e-9)
     assert quest.cost(path) == pytest.approx(best.cost, rel=1e-9, abs=1e-9)
@@ -124,8 +148,8 @@ def test_constraints_are_kept(pair, speeches):
     model, runtime = pair
     name = model.facts["names"][5]
     wanted, got = (m.plan(speeches[0], constraints={3: name}) for m in (model, runtime))
-    assert got.nodes[3] == 5
-    assert np.array_equal(got.nodes, wanted.nodes)
+    assert runtime.names[got.nodes[3]] == name
+    assert names_of(runtime, got.nodes) == names_of(model, wanted.nodes)
     for constraints, message in (({3: "nobody:1"}, "unknown node"), ({0: name}, "is silence"), ({99: name}, "no phone 99")):
         with pytest.raises(RuntimeInputError, match=message):
             runtime.plan(speeches[0], constraints=constraints)

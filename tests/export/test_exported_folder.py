@@ -95,7 +95,7 @@ def test_a_changed_manifest_is_named(folder):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 2}, "format 2; this runtime reads 1"),
+        ({"format": 1}, "format 1; this runtime reads 2"),
         ({"method": "gan"}, "unknown method .* 'gan'"),
         ({"written_by": "somebody"}, "was not written by"),
         ({"files": {"../lds.py": {"bytes": 1, "sha256": ""}}}, "is not a file of this folder"),

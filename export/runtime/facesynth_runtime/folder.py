@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from facesynth_runtime.errors import RuntimeInputError
 
-FORMAT = 1
+FORMAT = 2
 MANIFEST = "manifest.json"
 MOST_BYTES = 1 << 24
 """Of a manifest: a larger one is none."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth_runtime.efase.assembly import Smoothing, at_rate, close_lips, concatenate, gap
+from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Floats, Ints, Nodes, Query, Weights
 from facesynth_runtime.efase.search import Search
 from facesynth_runtime.efase.stream import EfaseStream
@@ -31,7 +32,7 @@ class Plan:
     """The result of a search."""
 
     nodes: Ints
-    """[P] a node for each phone; -1 in silence."""
+    """[P] a node of the folder for each phone; -1 in silence."""
     cost: float
 
 
@@ -47,10 +48,16 @@ class Efase:
         self.nodes = Nodes.of(arrays, Weights(**settings["weights_of_cost"]))
         self.smoothing = Smoothing(**settings["smoothing"])
         self.rest = arrays["rest"].astype(np.float64)
+        self.bounds = StepBounds(self.nodes, arrays)
         self._captured = set(self.nodes.visemes.tolist())
         self._names = arrays["names"].tobytes()
         self._known: dict[str, int] | None = None
         self._decode = Graph(folder, "decode", threads)
+
+    @property
+    def names(self) -> list[str]:
+        """[N] of the nodes: utterance and number of the phone in it."""
+        return self._names.decode().split("\n")
 
     @property
     def has_lips(self) -> bool:
@@ -100,7 +107,7 @@ class Efase:
         queries = [
             self.query(label, feeling, fixed.get(t, -1)) for t, (label, feeling) in enumerate(zip(labels, feelings, strict=True))
         ]
-        nodes, cost, stretch = np.full(len(labels), -1, np.int64), 0.0, Stretch(self.nodes, look_ahead)
+        nodes, cost, stretch = np.full(len(labels), -1, np.int64), 0.0, Stretch(self, look_ahead)
         whole = self.settings["bridge_pauses"]
         for t, query in enumerate(queries):
             if query.phone >= 0 or whole:
@@ -110,7 +117,7 @@ class Efase:
                 if len(path):
                     nodes[t + 1 - len(path) : t + 1] = path
                     cost += stretch.search.cost(path)
-                stretch = Stretch(self.nodes, look_ahead)
+                stretch = Stretch(self, look_ahead)
         return Plan(nodes, cost)
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
@@ -179,7 +186,7 @@ class Efase:
         if labels[t] == SILENCE:
             raise RuntimeInputError(f"phone {t} is silence, which has no node; constrain a phone that is spoken")
         if self._known is None:
-            self._known = {known: n for n, known in enumerate(self._names.decode().split("\n"))}
+            self._known = {known: n for n, known in enumerate(self.names)}
         if name not in self._known:
             raise unknown("node", name, self._known)
         return self._known[name]
@@ -188,21 +195,21 @@ class Efase:
 class Stretch:
     """A run of phones that is searched as one; with a look-ahead, nodes are settled as it goes."""
 
-    def __init__(self, nodes: Nodes, look_ahead: int | None) -> None:
+    def __init__(self, model: Efase, look_ahead: int | None) -> None:
         if look_ahead is not None and look_ahead < 1:
             raise RuntimeInputError(f"look_ahead is {look_ahead}; wanted at least 1 phone, or None for the whole search")
-        self.search, self.look_ahead = Search(nodes), look_ahead
+        self.search, self.look_ahead = Search(model.nodes, model.bounds), look_ahead
         self.settled: list[int] = []
 
     def push(self, query: Query) -> None:
         """The next phone: with a look-ahead of n, the phone n before it is settled on the best path of this moment."""
         self.search.push(query)
-        if self.look_ahead is not None and len(self.search.queries) > self.look_ahead:
+        if self.look_ahead is not None and len(self.search) > self.look_ahead:
             self.settled.append(int(self.search.trace(self.look_ahead + 1)[0]))
 
     def finish(self) -> Ints:
         """[P] a node for each phone."""
-        if not self.search.queries:
+        if not len(self.search):
             return np.zeros(0, np.int64)
-        rest = self.search.trace(len(self.search.queries) - len(self.settled))
+        rest = self.search.trace(len(self.search) - len(self.settled))
         return np.concatenate([np.array(self.settled, np.int64), rest])

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
+TOGETHER = 48
+"""Pairs of nodes whose bending is computed at once."""
+
 
 @dataclass(frozen=True)
 class Weights:
@@ -42,27 +45,25 @@ class Query:
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """N nodes over frames of D coordinates."""
+    """N nodes over frames of D coordinates, sorted by viseme class, phone and emotion."""
 
-    frames: Floats
+    frames: NDArray[np.float32]
     starts: Ints
     stops: Ints
     phones: Ints
     visemes: Ints
     emotions: Ints
     before: Ints
-    nearest: Floats
-    """[N] least cost of a step to the node from the viseme class of its predecessor, other than from that itself."""
     weights: Weights
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[Any]], weights: Weights) -> Nodes:
         """From a folder's arrays; frames in 8 bits have a scale beside them."""
-        frames = arrays["node_frames"].astype(np.float64)
+        frames = arrays["node_frames"].astype(np.float32, copy=False)
         if "node_frames_scale" in arrays:
-            frames = frames * arrays["node_frames_scale"].astype(np.float64)
+            frames = frames * arrays["node_frames_scale"]
         columns = {name: arrays[name].astype(np.int64) for name in ("starts", "stops", "phones", "visemes", "emotions", "before")}
-        return cls(frames, **columns, nearest=arrays["nearest"].astype(np.float64), weights=weights)
+        return cls(frames, **columns, weights=weights)
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -73,73 +74,77 @@ class Nodes:
         return self.stops - self.starts
 
     @cached_property
-    def ends(self) -> Floats:
-        """[N, 2D] such that ‖end(i) - joint(j)‖² = eta PGap + VGap, the cost of a joint."""
-        return self._joint_vectors(self.stops - 1, self.stops - 2, 1.0)
+    def class_starts(self) -> Ints:
+        """[C] first node of each class: one phone in one emotion."""
+        change = (np.diff(self.phones) != 0) | (np.diff(self.emotions) != 0)
+        return np.concatenate([[0], np.flatnonzero(change) + 1]).astype(np.int64)
 
     @cached_property
-    def joints(self) -> Floats:
-        """[N, 2D]"""
-        return self._joint_vectors(self.starts, self.starts + 1, -1.0)
-
-    @cached_property
-    def squares(self) -> tuple[Floats, Floats]:
-        """[N] squared lengths of `ends` and of `joints`."""
-        return np.square(self.ends).sum(axis=1), np.square(self.joints).sum(axis=1)
-
-    @cached_property
-    def bends(self) -> Floats:
-        """[F, D] second difference of w p at each node's frames; meaningless at its last two."""
-        place = np.arange(len(self.frames)) - np.repeat(self.starts, self.lengths)
-        rising = (place / np.maximum(np.repeat(self.lengths, self.lengths) - 1, 1))[:, None] * self.frames
-        bent = np.zeros_like(rising)
-        bent[:-2] = rising[:-2] - 2 * rising[1:-1] + rising[2:]
-        return bent
+    def class_of(self) -> Ints:
+        """[N] class of each node."""
+        return np.repeat(np.arange(len(self.class_starts)), np.diff(np.append(self.class_starts, len(self))))
 
     def motion(self, node: int) -> Floats:
         """[L, D] frames of one node."""
-        return self.frames[self.starts[node] : self.stops[node]]
+        return self.frames[self.starts[node] : self.stops[node]].astype(np.float64)
 
-    def targets(self, query: Query) -> Floats:
-        """[N] cost of every node as an answer to one phone; infinite where it is forbidden."""
-        w = self.weights
-        same = self.visemes == query.viseme
-        cost = np.zeros(len(self))
+    def class_targets(self, query: Query) -> Floats:
+        """[C] cost of the nodes of every class as an answer to one phone; infinite where they are forbidden."""
+        w, first = self.weights, self.class_starts
+        same = self.visemes[first] == query.viseme
+        cost = np.zeros(len(first))
         if query.phone >= 0:
-            cost += np.where(self.phones != query.phone, np.where(same, w.gamma, 1.0) * w.delta * w.pnt, 0.0)
+            cost += np.where(self.phones[first] != query.phone, np.where(same, w.gamma, 1.0) * w.delta * w.pnt, 0.0)
         if query.emotion >= 0:
-            cost += np.where(self.emotions != query.emotion, w.phi * w.pnt, 0.0)
+            cost += np.where(self.emotions[first] != query.emotion, w.phi * w.pnt, 0.0)
         if query.strict:
             cost[~same] = np.inf
-        if query.node >= 0:
-            cost[np.arange(len(self)) != query.node] = np.inf
         return cost
 
     def steps(self, i: Ints, j: Ints) -> Floats:
         """[n] transition costs TC(i, j) of pairs of nodes."""
         w, p = self.weights, self.before[j]
-        cost = w.beta * self.bending(i, np.maximum(p, 0)) + np.square(self.ends[i] - self.joints[j]).sum(axis=1)
+        cost = w.beta * self.bending(i, np.maximum(p, 0)) + np.square(self.ends(i) - self.joints(j)).sum(axis=1)
         cost = cost + np.where(self.visemes[i] == self.visemes[p], 0.0, w.pnt)
         return np.where(p == i, 0.0, np.where(p < 0, w.alpha * w.pnt, cost))
 
+    def ends(self, which: Ints) -> Floats:
+        """[n, 2D] such that ‖end(i) - joint(j)‖² = eta PGap + VGap, the cost of a joint."""
+        return self._joint_vectors(which, self.stops[which] - 1, -1, 1.0)
+
+    def joints(self, which: Ints) -> Floats:
+        """[n, 2D]"""
+        return self._joint_vectors(which, self.starts[which], 1, -1.0)
+
     def bending(self, i: Ints, p: Ints) -> Floats:
-        """[n] DSC(i, p): i stretched to p's length and faded out, its second difference added to that of p fading in."""
+        """[n] DSC(i, p): i stretched to p's length and faded out, its second difference added to that of p fading in.
+
+        Pairs of like length go together, so that little is computed for nothing.
+        """
+        cost = np.empty(len(i))
+        order = np.argsort(self.lengths[p])
+        for some in np.split(order, range(TOGETHER, len(i), TOGETHER)):
+            cost[some] = self._bending(i[some], p[some])
+        return cost
+
+    def _bending(self, i: Ints, p: Ints) -> Floats:
         length_i, length = self.lengths[i], self.lengths[p]
-        k = np.arange(int(length.max(initial=3)))
+        k = np.arange(max(int(length.max(initial=0)), 3))
         span = np.maximum(length - 1, 1)[:, None]
         at = k * (length_i - 1)[:, None] / span
         low = np.minimum(at.astype(np.int64), np.maximum(length_i - 2, 0)[:, None])
-        share = (at - low)[..., None]
+        fade, last = np.where(k < length[:, None], 1 - k / span, 0.0), len(self.frames) - 1
         first = self.starts[i][:, None]
-        here = self.frames[np.minimum(first + low, len(self.frames) - 1)]
-        there = self.frames[np.minimum(first + np.minimum(low + 1, (length_i - 1)[:, None]), len(self.frames) - 1)]
-        fade = np.where(k < length[:, None], 1 - k / span, 0.0)[..., None] * (here + share * (there - here))
-        rows = np.minimum(self.starts[p][:, None] + k[:-2], len(self.frames) - 1)
-        bent = fade[:, :-2] - 2 * fade[:, 1:-1] + fade[:, 2:] + self.bends[rows]
+        here = self.frames[np.minimum(first + low, last)]
+        there = self.frames[np.minimum(first + np.minimum(low + 1, (length_i - 1)[:, None]), last)]
+        share = at - low
+        blend = (fade * (1 - share))[..., None] * here + (fade * share)[..., None] * there
+        blend += (k / span)[..., None] * self.frames[np.minimum(self.starts[p][:, None] + k, last)]
+        bent = blend[:, :-2] - 2 * blend[:, 1:-1] + blend[:, 2:]
         inside = k[:-2] < (length - 2)[:, None]
-        return np.where(inside, np.square(bent).sum(axis=2), 0.0).sum(axis=1)
+        return (np.einsum("nkd,nkd->nk", bent, bent) * inside).sum(axis=1)
 
-    def _joint_vectors(self, at: Ints, inner: Ints, sign: float) -> Floats:
-        inner = np.where(self.lengths > 1, inner, at)
-        velocity = sign * (self.frames[at] - self.frames[inner])
-        return np.hstack([np.sqrt(self.weights.eta) * self.frames[at], velocity])
+    def _joint_vectors(self, which: Ints, at: Ints, inward: int, sign: float) -> Floats:
+        position = self.frames[at].astype(np.float64)
+        inner = self.frames[np.where(self.lengths[which] > 1, at + inward, at)]
+        return np.hstack([np.sqrt(self.weights.eta) * position, sign * (position - inner)])

@@ -1,187 +1,221 @@
-"""The cheapest path, exactly, one phone at a time, looking at few of the pairs.
+"""The cheapest path, exactly, looking at few of the nodes.
 
-phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j) is computed only for the nodes that may matter; all others
-keep a lower bound that costs O(1) each (see facesynth's search, whose bound this is). Where a node does matter, its
-predecessors are sorted by phi + the cost of the joint, which matrix products give for all of them; the costly bending is
-computed from the front until nothing better can follow, and predecessors that are themselves only bounded are computed
-when they come first. Everything is float64 and in batches, because numpy pays for each call.
+phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j). Three passes find the best path to the newest phone:
+
+* as phones come, a lower bound of phi is kept for every node (`StepBounds.forward`), and beside it a beam: a few nodes
+  whose paths are real ones, so that their costs are upper bounds;
+* backwards, the least that is still to come bounds what a path through a node costs in all; nodes for which that exceeds
+  the beam's best path are left out, which are nearly all;
+* forwards again, phi is computed exactly for the nodes that are left. Predecessors are sorted by phi + the cost of the
+  joint, by matrix products; the costly bending is computed from the front until nothing better can follow.
+
+What was computed once is kept: when a phone is added, only nodes that were left out before may have to be looked at.
+Bounds are compared with a margin for rounding; ties go to the lowest node. numpy pays for each call: all is in batches.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Floats, Ints, Nodes, Query
+from facesynth_runtime.products import product
 
-BATCH = 24
-"""Nodes evaluated at once when the smallest phi is looked for; doubled from round to round."""
+BEAM = 32
+"""Nodes with real paths that are kept at each phone."""
+TRIED = 2
+"""Predecessors of each node that the beam tries, the nearest ones."""
 CHUNK = 6
 """Predecessors of each node whose bending is computed at once."""
 ROUNDING = 1e-9
 """By which squared distances from matrix products are lowered, relative to the vectors."""
+MARGIN = 1e-5
+"""Of upper bounds: tables and bounds are in single precision."""
+UNKNOWN, START = -2, -1
+"""In place of a predecessor."""
 
-Request = tuple[int, Ints]
-"""Position and nodes whose phi must be known."""
+
+@dataclass(eq=False)
+class Position:
+    """What is known at one phone."""
+
+    query: Query
+    targets: Floats
+    """[C] target cost of the nodes of each class."""
+    phi: Floats
+    """[N] exact where `back` is known, elsewhere a lower bound."""
+    back: NDArray[np.int32]
+    """[N] best predecessor."""
+    beam: Ints
+    upper: Floats
+    """[K] cost of a path to each node of the beam."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Nodes that may be on the best path."""
+
+    nodes: Ints
+    unknown: NDArray[np.bool_]
+    """[n] whose phi must be computed."""
+    rest: Floats
+    """[n] what a path costs at least after the node."""
 
 
 class Search:
     """`push` phones; `path` is the best so far."""
 
-    def __init__(self, nodes: Nodes) -> None:
-        self.nodes = nodes
-        self.queries: list[Query] = []
-        self.phi: list[Floats] = []
-        self.known: list[NDArray[np.bool_]] = []
-        self.back: list[NDArray[np.int32]] = []
-        self.least: list[int] = []
-        """The node of smallest phi at each position."""
-        self._targets: list[Floats] = []
-        self._rising: list[tuple[Ints, Floats]] = []
-        """Of each position: nodes by rising phi, as it was known when the position was settled, and that phi."""
+    def __init__(self, nodes: Nodes, bounds: StepBounds) -> None:
+        self.nodes, self.bounds = nodes, bounds
+        self.positions: list[Position] = []
+
+    def __len__(self) -> int:
+        return len(self.positions)
 
     def push(self, query: Query) -> None:
         """The next phone."""
-        t, nodes = len(self.queries), self.nodes
-        self.queries.append(query)
-        target, back = nodes.targets(query), np.full(len(nodes), -1, np.int32)
-        phi = target.copy()
-        known = np.ones(len(nodes), bool) if t == 0 else nodes.before < 0
-        if t:
-            phi += self._bounds(t)
-            back[known] = self.least[t - 1]
-        self._targets.append(target)
-        self.phi.append(phi)
-        self.known.append(known)
-        self.back.append(back)
-        self.least.append(self._settle_least(t))
-        order = np.flatnonzero(phi < np.inf)
-        order = order[np.argsort(phi[order], kind="stable")]
-        self._rising.append((order, phi[order]))
+        nodes = self.nodes
+        targets, back = nodes.class_targets(query), np.full(len(nodes), UNKNOWN, np.int32)
+        phi = targets[nodes.class_of]
+        if query.node >= 0:
+            phi = np.where(np.arange(len(nodes)) == query.node, phi, np.inf)
+        if self.positions:
+            phi += self.bounds.forward(self.positions[-1].phi)
+        else:
+            back[:] = START
+        beam, upper = self._beam(targets, phi)
+        self.positions.append(Position(query, targets, phi, back, beam, upper))
 
     def path(self) -> Ints:
-        """[T] the nodes of the cheapest path to the newest phone; ties go to the lowest node."""
-        return self.trace(len(self.queries))
+        """[T] the nodes of the cheapest path to the newest phone."""
+        return self.trace(len(self))
 
     def trace(self, count: int) -> Ints:
         """[count] the last nodes of that path."""
-        node, nodes = self.least[-1], []
-        for t in range(len(self.queries) - 1, len(self.queries) - 1 - count, -1):
-            nodes.append(node)
-            node = int(self.back[t][node])
-        return np.array(nodes[::-1], np.int64)
+        self._solve()
+        last = self.positions[-1]
+        node, found = int(np.where(last.back == UNKNOWN, np.inf, last.phi).argmin()), []
+        for position in self.positions[: -count - 1 : -1]:
+            found.append(node)
+            node = int(position.back[node])
+        return np.array(found[::-1], np.int64)
 
     def cost(self, path: Ints) -> float:
         """The whole COST of a path [T]."""
-        targets = sum(float(self.nodes.targets(query)[node]) for query, node in zip(self.queries, path, strict=True))
+        at = zip(self.positions, self.nodes.class_of[path], strict=True)
+        targets = sum(float(position.targets[number]) for position, number in at)
         return targets + float(self.nodes.steps(path[:-1], path[1:]).sum())
 
-    def _bounds(self, t: int) -> Floats:
-        """[N] what phi_t costs at least, the target left out."""
-        nodes, phi, w = self.nodes, self.phi[t - 1], self.nodes.weights
-        least = phi[self.least[t - 1]]
-        by_viseme = np.full(int(nodes.visemes.max()) + 1, np.inf)
-        np.minimum.at(by_viseme, nodes.visemes, phi)
-        alike = by_viseme[nodes.visemes[nodes.before]] + nodes.nearest
-        bound = np.minimum(np.minimum(phi[nodes.before], alike), least + w.pnt)
-        return np.where(nodes.before < 0, least + w.alpha * w.pnt, bound)
+    def _beam(self, targets: Floats, phi: Floats) -> tuple[Ints, Floats]:
+        """Real paths to nodes of small bounds and to those that were recorded after the last beam."""
+        nodes, wide = self.nodes, min(BEAM, len(phi))
+        chosen = np.argpartition(phi, wide - 1)[:wide]
+        if not self.positions:
+            return chosen, phi[chosen]
+        last = self.positions[-1]
+        chosen = np.union1d(chosen, self.bounds.following(last.beam))
+        chosen = chosen[phi[chosen] < np.inf]
+        upper = self._reached(last.beam, last.upper, chosen) + targets[nodes.class_of[chosen]]
+        best = np.argsort(upper, kind="stable")[:BEAM]
+        return chosen[best], upper[best]
 
-    def _settle_least(self, t: int) -> int:
-        phi, known, batch = self.phi[t], self.known[t], BATCH
-        while True:
-            least = np.where(known, phi, np.inf).min()
-            asked = np.flatnonzero(~known & (phi <= least) & (phi < np.inf))
-            if not len(asked):
-                return int(np.flatnonzero(known & (phi == least))[0]) if least < np.inf else int(phi.argmin())
-            asked = asked[np.argsort(phi[asked], kind="stable")[:batch]]
-            self._require(t, asked)
-            batch *= 2
+    def _reached(self, i: Ints, phi: Floats, j: Ints) -> Floats:
+        """[m] costs of paths to the nodes j, each through one of the predecessors that look best."""
+        nodes = self.nodes
+        costs = phi + self._joints(i, j)
+        wide = min(TRIED, len(i))
+        tried = np.argpartition(costs, wide - 1, axis=1)[:, :wide]
+        steps = nodes.steps(i[tried].ravel(), np.repeat(j, wide)).reshape(tried.shape)
+        best = (phi[tried] + steps).min(axis=1)
+        place = np.full(len(nodes) + 1, -1)
+        place[i] = np.arange(len(i))
+        captured = place[nodes.before[j]]
+        return np.minimum(best, np.where(captured >= 0, phi[captured], np.inf))
 
-    def _require(self, t: int, asked: Ints) -> None:
-        """Make phi known; evaluations that wait for earlier positions are piled up, not nested."""
-        pile = [self._evaluate(t, asked)]
-        while pile:
-            request = next(pile[-1], None)
-            if request is None:
-                pile.pop()
-            else:
-                pile.append(self._evaluate(*request))
+    def _joints(self, i: Ints, j: Ints) -> Floats:
+        """[m, n] cost of the joint from each i to each j, rounded down, and of another viseme class."""
+        nodes = self.nodes
+        ends, joints = nodes.ends(i), nodes.joints(j)
+        total = np.square(joints).sum(axis=1)[:, None] + np.square(ends).sum(axis=1)
+        cost = np.maximum(total * (1 - ROUNDING) - 2 * product(joints, ends.T), 0.0)
+        cost += np.where(nodes.visemes[nodes.before[j]][:, None] == nodes.visemes[i], 0.0, nodes.weights.pnt)
+        return cost
 
-    def _evaluate(self, t: int, asked: Ints) -> Iterator[Request]:
-        """phi_t of some nodes, those that share the viseme class before them together."""
-        asked = asked[~self.known[t][asked]]
-        classes = self.nodes.visemes[self.nodes.before[asked]]
-        for viseme in np.unique(classes):
-            yield from self._evaluate_alike(t, asked[classes == viseme], int(viseme))
+    def _solve(self) -> None:
+        """Make phi known for every node at the newest phone that may be its best, and for all on the way there."""
+        limit = float(self.positions[-1].upper.min())
+        limit += MARGIN * max(abs(limit), 1e-3)
+        kept = self._backwards(limit)
+        for t in range(len(self) - len(kept) + 1, len(self)):
+            self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
 
-    def _evaluate_alike(self, t: int, j: Ints, viseme: int) -> Iterator[Request]:
-        nodes, phi, known = self.nodes, self.phi[t - 1], self.known[t - 1]
-        captured = nodes.before[j]
-        start = np.full(len(j), self.least[t - 1], np.int64)
-        best, origin = phi[start] + nodes.steps(start, j), start
-        best, origin = _better(best, origin, np.where(known[captured], phi[captured], np.inf), captured)
-        i, k, joint, switch = self._promising(t, j, viseme, best)
-        bent = np.full(len(i), np.nan)
-        while True:
-            # Per node j: its next CHUNK pairs that may still win; the captured predecessor is free.
-            open_ = np.flatnonzero(np.isnan(bent) & (phi[i] + switch + joint <= best[k]))
-            if len(open_):
-                rank = np.arange(len(open_)) - np.searchsorted(k[open_], k[open_])
-                now = open_[rank < CHUNK]
-                exact = np.square(nodes.ends[i[now]] - nodes.joints[j[k[now]]]).sum(axis=1)
-                joint[now] = exact
-                bent[now] = nodes.weights.beta * nodes.bending(i[now], captured[k[now]])
-                yield from self._improve(t, i[now], k[now], joint[now] + bent[now] + switch[now], best, origin)
-                continue
-            waiting = ~known[captured] & (phi[captured] <= best)
-            if waiting.any():
-                yield t - 1, np.unique(captured[waiting])
-            # Known by now, or made known on the way.
-            best[:], origin[:] = _better(best, origin, np.where(known[captured], phi[captured], np.inf), captured)
-            if not waiting.any():
+    def _backwards(self, limit: float) -> list[Kept]:
+        """Nodes of the last positions, in the order of time, until all of them are known."""
+        last = self.positions[-1]
+        nodes = np.flatnonzero(last.phi <= limit)
+        found = [Kept(nodes, last.back[nodes] == UNKNOWN, np.zeros(len(nodes)))]
+        for position, after in zip(self.positions[-2::-1], self.positions[:0:-1], strict=True):
+            j = found[-1].nodes[found[-1].unknown]
+            if not len(j):
                 break
-        self.phi[t][j] = best + self._targets[t][j]
-        self.back[t][j], self.known[t][j] = origin, True
+            value = found[-1].rest[found[-1].unknown] + after.targets[self.nodes.class_of[j]]
+            i = np.flatnonzero(position.phi <= limit - value.min())
+            rest = self.bounds.backward(j, value, i)
+            left = position.phi[i] + rest <= limit
+            found.append(Kept(i[left], position.back[i[left]] == UNKNOWN, rest[left]))
+        return found[::-1]
 
-    def _promising(self, t: int, j: Ints, viseme: int, best: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-        """Pairs (i, index into j) that may be cheaper than `best`, for each j by rising cost, without the bending.
+    def _forwards(self, t: int, i: Ints, kept: Kept, limit: float) -> None:
+        """phi of the nodes that are not known at position t, from the nodes i before it."""
+        last, here = self.positions[t - 1], self.positions[t]
+        i = i[last.back[i] != UNKNOWN]
+        j, rest = kept.nodes[kept.unknown], kept.rest[kept.unknown]
+        if not len(j) or not len(i):
+            here.phi[j] = np.maximum(here.phi[j], limit - rest)
+            return
+        target = here.targets[self.nodes.class_of[j]]
+        best, origin = self._cheapest(i, last.phi[i], j, limit - rest - target)
+        phi, exact = best + target, best + target + rest <= limit
+        here.phi[j] = np.where(exact, phi, np.maximum(here.phi[j], limit - rest))
+        here.back[j[exact]] = origin[exact]
 
-        Beside them the cost of their joint, rounded down, and that of another viseme class.
-        """
-        nodes, (rising, phi) = self.nodes, self._rising[t - 1]
-        i = rising[: np.searchsorted(phi, best.max(), side="right")]
-        switch = np.where(nodes.visemes[i] == viseme, 0.0, nodes.weights.pnt)
-        base = self.phi[t - 1][i] + switch
-        kept = base <= best.max()
-        i, switch, base = i[kept], switch[kept], base[kept]
-        ends, joints = nodes.squares
-        total = ends[i][:, None] + joints[j]
-        squared = np.maximum(total * (1 - ROUNDING) - 2 * nodes.ends[i] @ nodes.joints[j].T, 0.0)
-        lowest = base[:, None] + squared
-        row, column = np.nonzero((lowest <= best) & (i[:, None] != nodes.before[j]))
-        order = np.lexsort((lowest[row, column], column))
-        row, column = row[order], column[order]
-        return i[row], column, squared[row, column], switch[row]
-
-    def _improve(self, t: int, i: Ints, k: Ints, step: Floats, best: Floats, origin: Ints) -> Iterator[Request]:
-        """Take pairs (i, k) of known step costs into account; those that are only bounded are asked for, the best first."""
-        phi, known = self.phi[t - 1], self.known[t - 1]
-        left = np.ones(len(i), bool)
+    def _cheapest(self, i: Ints, phi: Floats, j: Ints, limit: Floats) -> tuple[Floats, Ints]:
+        """[m] least phi(i) + TC(i, j), and where from; only what is within the limits [m] is looked for."""
+        nodes, captured = self.nodes, self.nodes.before[j]
+        place = np.full(len(nodes) + 1, -1)
+        place[i] = np.arange(len(i))
+        before = place[captured]
+        best, origin = np.where(before >= 0, phi[before], np.inf), captured.copy()
+        first = int(phi.argmin())
+        orphan = captured < 0
+        best[orphan], origin[orphan] = phi[first] + nodes.weights.alpha * nodes.weights.pnt, i[first]
+        lowest = phi + self._joints(i, j)
+        lowest[orphan] = np.inf
+        lowest[np.flatnonzero(before >= 0), before[before >= 0]] = np.inf
+        rows = np.arange(len(j))
+        self._try(rows, lowest.argmin(axis=1), lowest, i, phi, j, best, origin)
         while True:
-            cost = phi[i] + step
-            for at in np.flatnonzero(left & known[i] & (cost <= best[k])).tolist():
-                if cost[at] < best[k[at]] or (cost[at] == best[k[at]] and i[at] < origin[k[at]]):
-                    best[k[at]], origin[k[at]] = cost[at], i[at]
-            left &= ~known[i] & (cost <= best[k])
-            if not left.any():
-                return
-            waiting = np.flatnonzero(left)
-            waiting = waiting[np.lexsort((cost[waiting], k[waiting]))]
-            yield t - 1, np.unique(i[waiting[np.concatenate([[True], np.diff(k[waiting]) > 0])]])
+            row, column = np.nonzero(lowest <= np.minimum(best, limit)[:, None])
+            if not len(row):
+                return best, origin
+            order = np.lexsort((lowest[row, column], row))
+            row, column = row[order], column[order]
+            rank = np.arange(len(row)) - np.searchsorted(row, row)
+            now = rank < CHUNK
+            self._try(row[now], column[now], lowest, i, phi, j, best, origin)
 
-
-def _better(best: Floats, origin: Ints, cost: Floats, node: Ints) -> tuple[Floats, Ints]:
-    wins = (cost < best) | ((cost == best) & (node < origin))
-    return np.where(wins, cost, best), np.where(wins, node, origin)
+    def _try(self, row: Ints, column: Ints, lowest: Floats, i: Ints, phi: Floats, j: Ints, best: Floats, origin: Ints) -> None:
+        """Compute the pairs (i[column], j[row]) exactly, and take them off `lowest`."""
+        usable = lowest[row, column] < np.inf
+        row, column = row[usable], column[usable]
+        cost = phi[column] + self.nodes.steps(i[column], j[row])
+        lowest[row, column] = np.inf
+        order = np.lexsort((i[column], cost, row))
+        row, column, cost = row[order], column[order], cost[order]
+        ahead = np.concatenate([[True], row[1:] != row[:-1]])[: len(row)]
+        row, node, cost = row[ahead], i[column[ahead]], cost[ahead]
+        better = (cost < best[row]) | ((cost == best[row]) & (node < origin[row]))
+        best[row[better]], origin[row[better]] = cost[better], node[better]

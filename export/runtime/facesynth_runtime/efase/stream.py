@@ -40,7 +40,7 @@ class EfaseStream:
         self.paths: list[list[int]] = [[] for _ in range(self.plans)]
         self.frames_out = 0
         self._neutral = NEUTRAL
-        self._stretches = [Stretch(model.nodes, look_ahead) for _ in range(self.plans)]
+        self._stretches = [Stretch(model, look_ahead) for _ in range(self.plans)]
 
     def push(self, phone: str, end_s: float, emotion: str, intensity: float = 1.0) -> NDArray[np.float32]:
         """The next phone, to its end in seconds; the frames that became final, possibly none."""
@@ -81,7 +81,7 @@ class EfaseStream:
     def _end_stretch(self) -> None:
         for path, stretch in zip(self.paths, self._stretches, strict=True):
             path.extend(stretch.finish()[len(stretch.settled) :].tolist())
-        self._stretches = [type(stretch)(self.model.nodes, self.look_ahead) for stretch in self._stretches]
+        self._stretches = [type(stretch)(self.model, self.look_ahead) for stretch in self._stretches]
 
     def _emit(self, *, last: bool) -> NDArray[np.float32]:
         known = min(len(path) for path in self.paths)
