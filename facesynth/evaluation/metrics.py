@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from facesynth.errors import unknown
-from facesynth.evaluation import dynamics, geometry, head, lips, timing
+from facesynth.evaluation import dynamics, geometry, head, lips, timing, variety
 from facesynth.motion.motion import Motion
 from facesynth.speech.speech import PhoneTrack
 
@@ -81,6 +81,33 @@ METRICS: tuple[Metric, ...] = (
     _of_pair("head_distance", "deg", "low", head.head_distance),
 )
 """What is measured for every utterance of every method, in the order of the tables."""
+
+_OTHERS = (variety.diversity, variety.error_of_mean, variety.error_of_best, dynamics.join_jump)
+DEFINITIONS: Mapping[str, str] = {
+    name: " ".join(text.split())
+    for name, text in (
+        *((one.name, one.definition) for one in METRICS),
+        *((function.__name__, function.__doc__ or "") for function in _OTHERS),
+        (
+            "emotion_accuracy",
+            "Share of utterances whose emotion is recognised by a classifier that saw other sentences recorded.",
+        ),
+        ("other_phones", "Share of phones that were taken from a recording of another phone."),
+        ("other_visemes", "Share of phones that were taken from another viseme class."),
+        ("other_emotions", "Share of phones that were taken from another emotion."),
+        ("train_s", "Seconds of training by the clock, mean of the folds."),
+        ("train_cpu_s", "Seconds of training of the processor, one thread, mean of the folds."),
+        ("train_minutes", "Minutes of recordings that were learned from, mean of the folds."),
+        ("rtf", "Seconds of synthesis by the clock for a second of speech; the model is loaded and warm."),
+        ("rtf_cpu", "Seconds of synthesis of the processor, one thread, for a second of speech."),
+        (
+            "peak_mb",
+            "Largest memory (1e6 bytes) of a process that loads the model and speaks the first fold's longest utterance.",
+        ),
+        ("model_mb", "Size of the model file (1e6 bytes), mean of the folds."),
+    )
+}
+"""What every column of a comparison means."""
 
 
 def metric(name: str) -> Metric:

@@ -24,7 +24,7 @@ from facesynth.evaluation.details import Details
 from facesynth.evaluation.exports import best_labels, write_exports
 from facesynth.evaluation.face_video import worst_shown, write_side_by_side
 from facesynth.evaluation.family_figure import family_figure
-from facesynth.evaluation.metrics import METRICS
+from facesynth.evaluation.metrics import DEFINITIONS
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.paired import statements, tallied
 from facesynth.evaluation.point_face import PointFace
@@ -107,7 +107,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "provenance": comparison.provenance,
         "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
         "sources": len({one["versions"]["source"] for accounts in result.accounts.values() for one in accounts}),
-        "definitions": {m.name: " ".join(m.definition.split()) for m in METRICS},
+        "definitions": {c.name: DEFINITIONS[c.name] for c in comparison.columns if c.name in DEFINITIONS},
         "unit": unit,
     }
 

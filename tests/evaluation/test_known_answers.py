@@ -5,8 +5,9 @@ import pytest
 from talking_points import FPS, LAYOUT, moved, phones, talk
 
 from facesynth.errors import FacesynthError
+from facesynth.evaluation.compare import COSTS
 from facesynth.evaluation.lips import closure_threshold
-from facesynth.evaluation.metrics import METRICS, Case, metric
+from facesynth.evaluation.metrics import DEFINITIONS, METRICS, Case, metric
 from facesynth.motion.layout import Layout
 from facesynth.motion.motion import Motion
 
@@ -184,4 +185,6 @@ def test_every_metric_refuses_another_rate_length_and_layout(one):
 
 def test_every_metric_says_what_it_is():
     assert all(one.definition and one.unit and one.best for one in METRICS)
+    assert set(DEFINITIONS) > {one.name for one in METRICS} | {column.name for column in COSTS}
+    assert all(DEFINITIONS.values())
     assert {"lve", "lve_sq", "fdd", "fdd_abs", "closure_rate", "false_closure_rate", "lve_centred"} <= {m.name for m in METRICS}
