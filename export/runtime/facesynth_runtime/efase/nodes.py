@@ -41,6 +41,8 @@ class Query:
     """The node that must be used, or -1."""
     strict: bool = False
     """Whether no node of another viseme class is allowed."""
+    heard: Floats | None = None
+    """[N] what every node costs beside that, for how it sounds and moves; None where nothing is heard."""
 
 
 @dataclass(frozen=True, eq=False)

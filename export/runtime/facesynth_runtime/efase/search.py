@@ -15,7 +15,7 @@ Bounds are compared with a margin for rounding; ties go to the lowest node. nump
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ ROUNDING = 1e-9
 """By which squared distances from matrix products are lowered, relative to the vectors."""
 MARGIN = 1e-5
 """Of upper bounds: tables and bounds are in single precision."""
+MANY = 300
+"""Nodes a phone, on average, for which a better upper bound is worth looking for."""
 UNKNOWN, START = -2, -1
 """In place of a predecessor."""
 
@@ -44,13 +46,13 @@ class Position:
 
     query: Query
     targets: Floats
-    """[C] target cost of the nodes of each class."""
+    """[C] target cost of the nodes of each class, what is heard left out."""
     phi: Floats
     """[N] exact where `back` is known, elsewhere a lower bound."""
     back: NDArray[np.int32]
     """[N] best predecessor."""
-    beam: Ints
-    upper: Floats
+    beam: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    upper: Floats = field(default_factory=lambda: np.zeros(0))
     """[K] cost of a path to each node of the beam."""
 
 
@@ -80,14 +82,17 @@ class Search:
         nodes = self.nodes
         targets, back = nodes.class_targets(query), np.full(len(nodes), UNKNOWN, np.int32)
         phi = targets[nodes.class_of]
+        if query.heard is not None:
+            phi += query.heard
         if query.node >= 0:
             phi = np.where(np.arange(len(nodes)) == query.node, phi, np.inf)
         if self.positions:
             phi += self.bounds.forward(self.positions[-1].phi)
         else:
             back[:] = START
-        beam, upper = self._beam(targets, phi)
-        self.positions.append(Position(query, targets, phi, back, beam, upper))
+        here = Position(query, targets, phi, back)
+        here.beam, here.upper = self._beam(here)
+        self.positions.append(here)
 
     def path(self) -> Ints:
         """[T] the nodes of the cheapest path to the newest phone."""
@@ -105,20 +110,24 @@ class Search:
 
     def cost(self, path: Ints) -> float:
         """The whole COST of a path [T]."""
-        at = zip(self.positions, self.nodes.class_of[path], strict=True)
-        targets = sum(float(position.targets[number]) for position, number in at)
+        targets = sum(float(self._target(position, path[t : t + 1])[0]) for t, position in enumerate(self.positions))
         return targets + float(self.nodes.steps(path[:-1], path[1:]).sum())
 
-    def _beam(self, targets: Floats, phi: Floats) -> tuple[Ints, Floats]:
+    def _target(self, position: Position, which: Ints) -> Floats:
+        """[n] target cost of the nodes `which`."""
+        cost: Floats = position.targets[self.nodes.class_of[which]]
+        return cost if position.query.heard is None else cost + position.query.heard[which]
+
+    def _beam(self, here: Position) -> tuple[Ints, Floats]:
         """Real paths to nodes of small bounds and to those that were recorded after the last beam."""
-        nodes, wide = self.nodes, min(BEAM, len(phi))
+        phi, wide = here.phi, min(BEAM, len(here.phi))
         chosen = np.argpartition(phi, wide - 1)[:wide]
         if not self.positions:
             return chosen, phi[chosen]
         last = self.positions[-1]
         chosen = np.union1d(chosen, self.bounds.following(last.beam))
         chosen = chosen[phi[chosen] < np.inf]
-        upper = self._reached(last.beam, last.upper, chosen) + targets[nodes.class_of[chosen]]
+        upper = self._reached(last.beam, last.upper, chosen) + self._target(here, chosen)
         best = np.argsort(upper, kind="stable")[:BEAM]
         return chosen[best], upper[best]
 
@@ -146,11 +155,25 @@ class Search:
 
     def _solve(self) -> None:
         """Make phi known for every node at the newest phone that may be its best, and for all on the way there."""
-        limit = float(self.positions[-1].upper.min())
-        limit += MARGIN * max(abs(limit), 1e-3)
+        limit = _limit(self.positions[-1].upper)
         kept = self._backwards(limit)
+        if sum(len(some.nodes) for some in kept) > MANY * len(kept):
+            limit = min(limit, _limit(self._led(kept)))
+            kept = self._backwards(limit)
         for t in range(len(self) - len(kept) + 1, len(self)):
             self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
+
+    def _led(self, kept: list[Kept]) -> Floats:
+        """Costs of paths to the newest phone, found by a beam that knows both bounds: where the first beam went astray."""
+        i, phi = kept[0].nodes, self.positions[-len(kept)].phi[kept[0].nodes]
+        for position, some in zip(self.positions[1 - len(kept) :] if len(kept) > 1 else [], kept[1:], strict=True):
+            whole = position.phi[some.nodes] + some.rest
+            j = some.nodes[np.argsort(whole, kind="stable")[: 2 * BEAM]]
+            j = np.union1d(j, np.intersect1d(self.bounds.following(i), some.nodes))
+            phi = self._reached(i, phi, j) + self._target(position, j)
+            best = np.argsort(phi, kind="stable")[: 2 * BEAM]
+            i, phi = j[best], phi[best]
+        return phi
 
     def _backwards(self, limit: float) -> list[Kept]:
         """Nodes of the last positions, in the order of time, until all of them are known."""
@@ -161,7 +184,7 @@ class Search:
             j = found[-1].nodes[found[-1].unknown]
             if not len(j):
                 break
-            value = found[-1].rest[found[-1].unknown] + after.targets[self.nodes.class_of[j]]
+            value = found[-1].rest[found[-1].unknown] + self._target(after, j)
             i = np.flatnonzero(position.phi <= limit - value.min())
             rest = self.bounds.backward(j, value, i)
             left = position.phi[i] + rest <= limit
@@ -176,7 +199,7 @@ class Search:
         if not len(j) or not len(i):
             here.phi[j] = np.maximum(here.phi[j], limit - rest)
             return
-        target = here.targets[self.nodes.class_of[j]]
+        target = self._target(here, j)
         best, origin = self._cheapest(i, last.phi[i], j, limit - rest - target)
         phi, exact = best + target, best + target + rest <= limit
         here.phi[j] = np.where(exact, phi, np.maximum(here.phi[j], limit - rest))
@@ -219,3 +242,9 @@ class Search:
         row, node, cost = row[ahead], i[column[ahead]], cost[ahead]
         better = (cost < best[row]) | ((cost == best[row]) & (node < origin[row]))
         best[row[better]], origin[row[better]] = cost[better], node[better]
+
+
+def _limit(upper: Floats) -> float:
+    """The least of upper bounds, with a margin."""
+    least = float(upper.min())
+    return least + MARGIN * max(abs(least), 1e-3)
