@@ -269,6 +269,9 @@ class AnimeGraph(Method):
     ) -> Motion:
         """Motion for new speech. Nothing is random: `seed` changes nothing.
 
+        One after the other: the path, or above temperature 0 each phone as the mean of its candidates (`soft`), brought
+        to time; `low_pass` at the learned cut-offs; `sharpen`; components decoded; lips closed at p, b, m (`close_at`).
+
         look_ahead: search that many phones ahead, as for streaming, in place of the whole utterance.
         to_emotion, to_intensity: find motion in the speech's own emotion and map it to this one.
         """

@@ -221,7 +221,13 @@ class Efase(Method):
         fps: float | None = None,
         constraints: Mapping[int, str] | None = None,
     ) -> Motion:
-        """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name."""
+        """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name.
+
+        One after the other, at `database_fps`: what is heard and expected (`audio`); the cheapest path of each stretch of
+        speech (`search`) and, above temperature 0, the mean over paths around it (`soft`); nodes stretched to their
+        phones, joints smoothed, silence filled (`concatenation`); `sharpen`; PCA decoded; the neutral rendering blended in
+        where an emotion is weak; lips closed at p, b, m (`closures`); then the motion is resampled to `fps`.
+        """
         _ = self.fitted_layout
         _, bounds = self._phones(speech)
         intensity = speech.emotions.per_phone(speech.phones)[1]
