@@ -82,7 +82,7 @@ def evaluate(
         if not methods and not families:
             raise click.UsageError("name a method, a --family or --from-predictions")
         splits = splits or make_folds(recordings, folds, seed, test_limit=test_limit, train_minutes=train_minutes)
-    result = _result(recordings, contestants, splits, stored, output, seed=seed, workers=team)
+    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=team)
     page = write_report(output, result, recordings, known, Wish(title or recordings.performer, shown, videos=not no_video))
     if as_json:
         click.echo(result.comparison.json())
@@ -104,6 +104,7 @@ def _contestants(methods: Sequence[str], families: Sequence[Path], *, references
 def _result(
     corpus: Corpus,
     contestants: Sequence[Contestant],
+    families: Sequence[Family],
     splits: Sequence[Fold] | None,
     stored: Path | None,
     output: Path,
@@ -112,9 +113,10 @@ def _result(
     workers: Workers,
 ) -> Evaluation:
     from facesynth.evaluation.compare import evaluate as compare
-    from facesynth.evaluation.compare import folds_beside, judge_predictions
+    from facesynth.evaluation.compare import folds_beside, judge_predictions, predicted_labels
 
     if stored is None:
         assert splits is not None  # noqa: S101 - told apart by the caller
         return compare(contestants, corpus, splits, output, seed=seed, workers=workers)
-    return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, seed=seed, workers=workers)
+    labels = predicted_labels(stored, families)
+    return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, labels, seed=seed, workers=workers)

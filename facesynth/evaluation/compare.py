@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
-from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family, check_labels
+from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Contestant, Family, check_labels
 from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
@@ -160,14 +160,16 @@ def folds_beside(predictions: str | Path, corpus: Corpus) -> tuple[Fold, ...]:
     return (fold,)
 
 
-def predicted_labels(predictions: Path) -> list[str]:
-    """Methods that have predictions in a folder, by name."""
+def predicted_labels(predictions: Path, families: Sequence[Family] = ()) -> list[str]:
+    """Methods that have predictions in a folder: by name, then variants in the order of their families, then references."""
     if not predictions.is_dir():
         raise FacesynthError(f"{predictions}: no such folder; it should hold a folder of NPZ files for each method")
     labels = sorted(path.name for path in predictions.iterdir() if path.is_dir() and any(path.glob("*.npz")))
     if not [label for label in labels if label != SECOND_TAKE]:
         raise FacesynthError(f"{predictions} holds no predictions; wanted METHOD/UTTERANCE.npz in the documented form")
-    return [label for label in labels if label != SECOND_TAKE]
+    ordered = [label for family in families for label in family.labels] + list(REFERENCES)
+    last = [label for label in dict.fromkeys(ordered) if label in labels]
+    return [label for label in labels if label not in (SECOND_TAKE, *last)] + last
 
 
 def judges_of(corpus: Corpus, folds: Sequence[Fold], tested: Corpus) -> dict[str, Judge]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from facesynth.evaluation.curve import LIVELY, MEASURES, Curve, Measure, Point
-from facesynth.evaluation.figures import as_uri, colour_of, new_figure
+from facesynth.evaluation.figures import as_uri, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,10 +20,9 @@ ROOM = 1.25
 WIDEST_ENERGY = 1.8
 
 
-def curve_figure(curves: Sequence[Curve], references: Collection[str], unit: str) -> str:
+def curve_figure(curves: Sequence[Curve], references: Collection[str], unit: str, colours: Mapping[str, str]) -> str:
     """`lve` and `lve_centred` against `energy_ratio`; reference rows are squares, with a dotted curve."""
     figure, axes = new_figure(11, 7.2 if len(curves) > 8 else 5.4, 1, 2)
-    colours = colour_of([curve.label for curve in curves])
     for axis, measure in zip(axes[0], MEASURES, strict=True):
         axis.axvspan(*LIVELY, color="#eef3ea", zorder=0)
         for curve in curves:

@@ -64,7 +64,7 @@ def _curve(axis: Axes, scores: Sequence[Score], places: Sequence[float], *, from
     axis.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
     axis.plot(at, means, "o-", color=COLOURS[0], markersize=4)
     if from_zero:
-        axis.set_ylim(0, None)
+        axis.set_ylim(0, 1.1 * np.nanmax(means))
 
 
 def _lines(axis: Axes, scores: Sequence[Score], labels: Sequence[str], *, from_zero: bool) -> None:
@@ -73,7 +73,7 @@ def _lines(axis: Axes, scores: Sequence[Score], labels: Sequence[str], *, from_z
     axis.errorbar(means, rows, xerr=[means - low, high - means], fmt="o", color=COLOURS[0], markersize=4, linewidth=1)
     axis.axvline(means[0], color="#cccccc", linewidth=0.8, zorder=0)
     if from_zero:
-        axis.set_xlim(0, None)
+        axis.set_xlim(0, 1.1 * np.nanmax(means))
     axis.locator_params(axis="x", nbins=5)
     axis.set_yticks(rows, labels, fontsize=8)
     axis.set_ylim(len(labels) - 0.5, -0.5)

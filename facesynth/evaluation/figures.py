@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8C6D1F", "#56B4E9", "#6A3D9A", "#E69F00", "#444444", "#B22222")
+COLOURS = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8C6D1F", "#56B4E9", "#6A3D9A", "#E69F00", "#444444", "#B22222",
+    "#17BECF", "#8FB339", "#FF5CA8", "#1F1F8F",
+)  # fmt: skip
 """For methods, in order; told apart by most people who see colours differently."""
 STYLE = {
     "font.size": 9,
@@ -30,7 +33,7 @@ STYLE = {
 
 
 def colour_of(labels: Sequence[str]) -> dict[str, str]:
-    """A colour for each method, the same in every figure; more methods than there are good colours share a rainbow."""
+    """A colour for each method; more methods than there are good colours share a rainbow."""
     import matplotlib as mpl
 
     if len(labels) <= len(COLOURS):
@@ -107,7 +110,7 @@ def _bars(axis: Axes, points: Array, face: PointFace, worst: float, *, first: bo
     return drawn
 
 
-def histogram_figure(details: Mapping[str, Details], unit: str) -> str:
+def histogram_figure(details: Mapping[str, Details], unit: str, colours: Mapping[str, str]) -> str:
     """How lip residuals are spread, with the normal distribution of the same variance beside it (Saisan 2004, fig. 1)."""
     shown = {label: one for label, one in details.items() if one.histogram.size and one.histogram.sum() > 0}
     if not shown:
@@ -115,7 +118,6 @@ def histogram_figure(details: Mapping[str, Details], unit: str) -> str:
     columns = min(len(shown), 5)
     rows = -(-len(shown) // columns)
     figure, axes = new_figure(11, 2.1 * rows, rows, columns, sharex=True, sharey=True)
-    colours = colour_of(list(details))
     for axis in axes.ravel()[len(shown) :]:
         axis.axis("off")
     for axis, (label, one) in zip(axes.ravel(), shown.items(), strict=False):

@@ -78,6 +78,7 @@ def write_report(folder: str | Path, result: Evaluation, corpus: Corpus, familie
 def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wish: Wish) -> dict[str, Any]:
     comparison, unit, pictured = result.comparison, corpus.layout.unit, pictured_rows(result.comparison, families)
     details = {label: one for label, one in result.details.items() if label in pictured}
+    colours = figures.colour_of(pictured)
     recorded = _some_frames(corpus, comparison.utterances)
     face = PointFace.of(corpus.layout, recorded)
     matrices = {row.label: row.confusion for row in comparison.rows if row.confusion and row.label in pictured}
@@ -98,12 +99,12 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "differences": result.differences,
         "emotions": _by_emotion(comparison, result.main_columns(), pictured),
         "phones": _phones(details),
-        **_curves(result, families, unit),
+        **_curves(result, families, unit, colours),
         "face": figures.face_figure(details, face, unit),
-        "histograms": figures.histogram_figure(details, unit),
+        "histograms": figures.histogram_figure(details, unit, colours),
         "confusions": figures.confusion_figure(matrices),
         "families": [(family, family_figure(comparison, family)) for family in families],
-        "shown": list(_shown(result, corpus, face, wish, pictured)),
+        "shown": list(_shown(result, corpus, face, wish, colours)),
         "provenance": comparison.provenance,
         "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
         "sources": len({one["versions"]["source"] for accounts in result.accounts.values() for one in accounts}),
@@ -141,11 +142,12 @@ def _by_emotion(comparison: Comparison, columns: Sequence[str], labels: Sequence
     return {emotion: table(comparison.of_emotion(emotion), quality, labels) for emotion in found}
 
 
-def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[str, Any]:
+def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: Mapping[str, str]) -> dict[str, Any]:
     """The picture of all curves, and for each curve the nearest and the best lively point by both errors.
 
     Of a family that is no single method only the first variant is here: the others have a picture of their own.
     """
+    colours = {**colours, **{family.curve: colours.get(family.labels[0], "#444444") for family in families}}
     crowd = {label for family in families if not family.curve for label in family.labels[1:]}
     curves = [curve for curve in result.curves(families) if curve.label not in crowd]
     references = (*REFERENCES, SECOND_TAKE)
@@ -156,7 +158,7 @@ def _curves(result: Evaluation, families: Sequence[Family], unit: str) -> dict[s
         )
         for curve in curves
     ]
-    return {"trade": curve_figure(curves, references, unit) if curves else "", "curves": rows, "lively": LIVELY}
+    return {"trade": curve_figure(curves, references, unit, colours) if curves else "", "curves": rows, "lively": LIVELY}
 
 
 def _best(curve: Curve, point: Point | None, measure: Measure) -> tuple[str, str]:
@@ -183,7 +185,11 @@ def _phones(details: Mapping[str, Details]) -> dict[str, Any]:
     }
 
 
-def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish, labels: Sequence[str]) -> Iterator[dict[str, str]]:
+def _shown(
+    result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish, colours: Mapping[str, str]
+) -> Iterator[dict[str, str]]:
+    """What is drawn of chosen utterances, of the rows that have a colour."""
+    labels = [row.label for row in result.comparison.rows if row.label in colours]
     order = sorted(labels, key=lambda label: SHOWN_LAST.index(label) if label in SHOWN_LAST else -1)
     worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
     for utterance_id in track(wish.shown or typical(result), "pictures"):
@@ -194,7 +200,7 @@ def _shown(result: Evaluation, corpus: Corpus, face: PointFace, wish: Wish, labe
             "id": utterance_id,
             "text": utterance.speech.text,
             "emotion": utterance.emotion,
-            "trajectories": trajectory_figure(utterance, drawn, list(labels)),
+            "trajectories": trajectory_figure(utterance, drawn, colours),
             "video": _video(utterance_id, corpus, dict(islice(motions.items(), MOST_PANELS)), face, worst) if wish.videos else "",
         }
 

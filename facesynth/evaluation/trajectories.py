@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from facesynth.corpus import Utterance
-from facesynth.evaluation.figures import as_uri, colour_of, new_figure
+from facesynth.evaluation.figures import as_uri, new_figure
 from facesynth.evaluation.pair import Array, UnavailableError, distances, paired_points
 from facesynth.evaluation.regions import lip_points
 from facesynth.motion.layout import Layout
@@ -39,8 +39,8 @@ def shown_channels(layout: Layout, frames: Array) -> list[tuple[str, int]]:
     ]
 
 
-def trajectory_figure(utterance: Utterance, motions: Mapping[str, Motion], labels: list[str]) -> str:
-    """Position and velocity of two lip points, and the lip error, over time; `labels` fix the colours."""
+def trajectory_figure(utterance: Utterance, motions: Mapping[str, Motion], colours: Mapping[str, str]) -> str:
+    """Position and velocity of two lip points, and the lip error, over time; a colour for each method."""
     truth = utterance.motion
     try:
         channels = shown_channels(truth.layout, truth.frames.astype(np.float64))
@@ -48,7 +48,7 @@ def trajectory_figure(utterance: Utterance, motions: Mapping[str, Motion], label
         return ""
     few = dict(list(motions.items())[:MOST_SHOWN])
     figure, axes = new_figure(11, 9.5, 2 * len(channels) + 1, 1, sharex=True)
-    colours, unit, count = colour_of(labels), truth.layout.unit, round(LONGEST_S * truth.fps)
+    unit, count = truth.layout.unit, round(LONGEST_S * truth.fps)
     for row, (name, channel) in enumerate(channels):
         tracks = {label: motion.frames[:count, channel].astype(np.float64) for label, motion in few.items()}
         position, velocity = axes[2 * row, 0], axes[2 * row + 1, 0]

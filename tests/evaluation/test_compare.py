@@ -9,8 +9,8 @@ from filelock import FileLock
 from facesynth.corpus.workers import Workers
 from facesynth.errors import FacesynthError
 from facesynth.evaluation import jobs
-from facesynth.evaluation.compare import evaluate, folds_beside, judge_predictions
-from facesynth.evaluation.contestants import SECOND_TAKE, Contestant
+from facesynth.evaluation.compare import evaluate, folds_beside, judge_predictions, predicted_labels
+from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family
 from facesynth.evaluation.folds import Fold, make_folds
 from facesynth.evaluation.geometry import marker_error
 from facesynth.evaluation.predictions import load_prediction, save_prediction
@@ -267,3 +267,10 @@ def test_two_runs_do_not_share_a_folder(corpus, folds, tmp_path):
 
 def test_the_whole_result_is_plain_json(result):
     json.loads(result.comparison.json(), parse_constant=pytest.fail)
+
+
+def test_stored_rows_come_in_the_order_of_their_families_with_references_last(tmp_path, corpus):
+    for label in ("zeta", "mean face", "b", "a", SECOND_TAKE, "ridge"):
+        save_prediction(tmp_path / label / "u.npz", "u", corpus[corpus.ids[0]].motion)
+    assert predicted_labels(tmp_path, [Family("t", ("b", "gone", "a"))]) == ["zeta", "b", "a", "mean face", "ridge"]
+    assert predicted_labels(tmp_path) == ["a", "b", "zeta", "mean face", "ridge"]

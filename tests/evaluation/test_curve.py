@@ -11,6 +11,7 @@ from facesynth.evaluation.contestants import SECOND_TAKE, Family
 from facesynth.evaluation.curve import GAINS, SHARPENINGS, VARIATIONS, Curve, Point, compromises, curves_of, mean_points
 from facesynth.evaluation.curve_figure import curve_figure
 from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.figures import colour_of
 from facesynth.evaluation.geometry import lve, lve_centred
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
@@ -127,7 +128,8 @@ def test_a_recording_is_a_point_and_no_curve():
 
 def test_the_picture_holds_every_curve():
     rows = mean_points([compromises(talk(size=0.9), talk())])
-    few = curve_figure(curves_of({"m": rows, "mean face": rows}, ()), ("mean face",), "mm")
-    many = curve_figure(curves_of({f"m{k}": rows for k in range(20)}, ()), (), "mm")
+    names = [f"m{k}" for k in range(20)]
+    few = curve_figure(curves_of({"m": rows, "mean face": rows}, ()), ("mean face",), "mm", colour_of(["m", "mean face"]))
+    many = curve_figure(curves_of(dict.fromkeys(names, rows), ()), (), "mm", colour_of(names))
     assert few.startswith("data:image/svg+xml;base64,")
     assert len(many) > len(few)
