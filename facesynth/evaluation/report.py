@@ -78,7 +78,7 @@ def write_report(folder: str | Path, result: Evaluation, corpus: Corpus, familie
 def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wish: Wish) -> dict[str, Any]:
     comparison, unit, pictured = result.comparison, corpus.layout.unit, pictured_rows(result.comparison, families)
     details = {label: one for label, one in result.details.items() if label in pictured}
-    colours = figures.colour_of(pictured)
+    colours = figures.colour_of([*pictured, *(family.curve for family in families if family.curve)])
     recorded = _some_frames(corpus, comparison.utterances)
     face = PointFace.of(corpus.layout, recorded)
     matrices = {row.label: row.confusion for row in comparison.rows if row.confusion and row.label in pictured}
@@ -93,7 +93,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "whole_notes": comparison.markdown().split("\n\n")[1:],
         "verdicts": verdicts(result),
         "many": len(comparison.rows) > MOST_IN_WORDS,
-        "left_out": len(comparison.rows) > len(pictured),
+        "left_out": len(comparison.rows) - len(pictured),
         "statements": statements(result.differences),
         "tally": tallied(result.differences),
         "differences": result.differences,
@@ -114,9 +114,17 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
 
 
 def pictured_rows(comparison: Comparison, families: Sequence[Family]) -> list[str]:
-    """Rows that have pictures of their own: of each family, which has its picture, only the first variant."""
-    variants = {label for family in families for label in family.labels[1:]}
-    return [row.label for row in comparison.rows if row.label not in variants]
+    """Rows that have pictures of their own: all but the variants, whose families have theirs.
+
+    Where there are variants and reference rows alone, the first of each family is drawn for it.
+    """
+    variants = {label for family in families for label in family.labels}
+    rows = [row.label for row in comparison.rows]
+    named = [label for label in rows if label not in variants]
+    if set(named) - {SECOND_TAKE, *REFERENCES}:
+        return named
+    firsts = {family.labels[0] for family in families}
+    return [label for label in rows if label in firsts or label not in variants]
 
 
 def table(comparison: Comparison, columns: Sequence[str], labels: Sequence[str] | None = None) -> dict[str, Any]:
@@ -145,11 +153,9 @@ def _by_emotion(comparison: Comparison, columns: Sequence[str], labels: Sequence
 def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: Mapping[str, str]) -> dict[str, Any]:
     """The picture of all curves, and for each curve the nearest and the best lively point by both errors.
 
-    Of a family that is no single method only the first variant is here: the others have a picture of their own.
+    Variants of a family that is no single method are left out: they have a picture of their own.
     """
-    colours = {**colours, **{family.curve: colours.get(family.labels[0], "#444444") for family in families}}
-    crowd = {label for family in families if not family.curve for label in family.labels[1:]}
-    curves = [curve for curve in result.curves(families) if curve.label not in crowd]
+    curves = [curve for curve in result.curves(families) if curve.label in colours]
     references = (*REFERENCES, SECOND_TAKE)
     rows = [
         (

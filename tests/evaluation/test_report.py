@@ -100,10 +100,11 @@ def test_variants_of_one_method_are_one_curve(folder, page):
 
 def test_many_rows_are_counted_and_only_the_first_of_each_family_is_drawn(result, corpus, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "MOST_IN_WORDS", 3)
+    assert pictured_rows(result.comparison, [FAMILY]) == ["second take", "mean face", "wrong"]
     assert pictured_rows(result.comparison, [FAMILY, CURVE]) == ["second take", "phone mean", "mean face"]
     text = write_report(tmp_path, result, corpus, [FAMILY], Wish("Tiny", videos=False)).read_text(encoding="utf-8")
     assert "<summary>In words</summary>" in text
-    assert "only the first variant of each family is drawn" in text
+    assert "pictures leave 2 variants out" in text
     assert "Better by both marker_error and lve" in text
     counts = tallied(result.differences)
     for figure in {one.figure for one in result.differences}:
