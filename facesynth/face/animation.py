@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.errors import FacesynthError
-from facesynth.face.closures import with_lips_met
+from facesynth.face.closures import with_lips_apart, with_lips_met
 from facesynth.face.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
 from facesynth.face.markers import LipGap, marker_vertices
 from facesynth.face.rig import ARKIT_NAMES, LOOK_DOWN_RAD, LOOK_OUT_RAD, LOOK_UP_RAD, PIVOT_MM, Rig, gaze_weights
@@ -135,7 +135,7 @@ def animate(
     Points become weights by bounded least squares on the rig, wherever they lie on it (`fit_layout`); curves with ARKit
     names pass through, and where no curve has such a name all keep their own. Blinks and
     gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`, and so do
-    the lips of another performer's points at p, b and m.
+    the lips of another performer's points at p, b and m; those lips never pass through each other.
 
     Parameters
     ----------
@@ -183,7 +183,9 @@ def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArr
     fit = fit_layout(rig, motion.layout, rest_of(motion))
     frames = fit.on_head(rig, motion.frames).reshape(len(motion), -1)
     weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
-    return (weights if phones is None else with_lips_met(weights, LipGap.of(rig), phones, motion.fps)), residual
+    lips = LipGap.of(rig)
+    met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
+    return with_lips_apart(met, lips), residual
 
 
 def arkit_columns(layout: Layout) -> dict[str, int]:

@@ -65,8 +65,7 @@ class MarkerBasis:
     @classmethod
     def fitted(cls, rig: Rig, layout: Layout, fit: LayoutFit) -> MarkerBasis:
         """The basis of points that a fit has put on the head; of 2-D points nothing is known along the third axis."""
-        order = {int(point): place for place, point in enumerate(fit.points)}
-        pairs = tuple((order[a], order[b]) for a, b in layout.lip_pairs if a in order and b in order)
+        pairs = tuple((int(upper), int(lower)) for upper, lower in fit.lip_pairs)
         seen = np.array([1.0, 1.0, float(layout.dimension == 3)])
         return cls._at(rig, fit.vertices, rig.rest_mm[fit.vertices].ravel(), pairs, seen)
 

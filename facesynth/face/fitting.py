@@ -62,12 +62,22 @@ class LayoutFit:
     """[M] from each placed point to its vertex after the fit without bending."""
     named: bool
     """Whether names, not nearness, placed the points."""
+    lip_pairs: NDArray[np.int64]
+    """[P, 2] places among the M points of the inner lips that face each other: upper, lower."""
 
     def on_head(self, rig: Rig, frames: ArrayLike) -> Floats:
-        """[T, M, 3] mm: the vertices of the head, moved as the points of frames [T, C] moved from their rest."""
+        """[T, M, 3] mm: the vertices of the head, moved as the points of frames [T, C] moved from their rest.
+
+        The performer's rest is shut lips, however far apart their points then are: under a moustache 6 mm. Points of
+        pressed lips come nearer still; on the head lips that have met stay so, and do not pass through each other.
+        """
         values = np.asarray(frames, np.float64).reshape(len(np.asarray(frames)), *self.neutral.shape)
-        moved = (values[:, self.points] - self.neutral[self.points]) @ self.linear
-        return rig.rest_mm[self.vertices] + moved
+        placed = rig.rest_mm[self.vertices] + (values[:, self.points] - self.neutral[self.points]) @ self.linear
+        upper, lower = self.lip_pairs.T
+        crossed_mm = np.maximum(placed[:, lower, 1] - placed[:, upper, 1], 0.0)
+        placed[:, upper, 1] += crossed_mm / 2
+        placed[:, lower, 1] -= crossed_mm / 2
+        return placed
 
     def placed_mm(self) -> Floats:
         """[K, 3] the performer's rest in the head's axes."""
@@ -92,14 +102,21 @@ def fit_layout(rig: Rig, layout: Layout, neutral: ArrayLike | None = None) -> La
     placed = shape @ linear + shift
     if len(named) >= ENOUGH_NAMES or (len(named) and len(named) >= len(layout.names) // 2):
         off = np.linalg.norm((placed[named] - rig.rest_mm[vertices])[:, : layout.dimension], axis=1)
-        return LayoutFit(named, vertices, linear, shape, shift, off, True)
+        return LayoutFit(named, vertices, linear, shape, shift, off, True, _facing(layout, named))
     points, nearest = _nearest(rig, layout, _bent(rig, placed, named, vertices))
     if len(points) < 3:
         raise FacesynthError(
             f"only {len(points)} of {len(layout.names)} points lie on the face: are its axes left, up, out of the face?"
         )
     off = np.linalg.norm(placed[points] - rig.rest_mm[nearest], axis=1)
-    return LayoutFit(points, nearest, linear, shape, shift, off, False)
+    return LayoutFit(points, nearest, linear, shape, shift, off, False, _facing(layout, points))
+
+
+def _facing(layout: Layout, points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """[P, 2] pairs of the layout's inner lips of which both points were placed, as places among those."""
+    place = {int(point): number for number, point in enumerate(points)}
+    pairs = [(place[upper], place[lower]) for upper, lower in layout.lip_pairs if upper in place and lower in place]
+    return np.array(pairs, np.int64).reshape(-1, 2)
 
 
 def rest_of(motion: Motion) -> Floats:

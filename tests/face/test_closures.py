@@ -1,10 +1,10 @@
-"""Lips meet at p, b and m where the points of another performer left them ajar."""
+"""Lips meet at p, b and m where the points of another performer left them ajar, and never pass through each other."""
 
 import numpy as np
 import pytest
 
 from facesynth.face.animation import animate
-from facesynth.face.closures import MOST_MM, with_lips_met
+from facesynth.face.closures import MOST_MM, with_lips_apart, with_lips_met
 from facesynth.face.markers import LipGap, marker_layout
 from facesynth.face.rig import ARKIT_NAMES
 from facesynth.motion.layout import Layout
@@ -72,3 +72,42 @@ def test_only_points_of_another_performer_are_corrected(rig, lips):
         without, told = (lips.opening_mm(animate(motion, rig, phones=phones).weights) for phones in (None, PHONES))
         assert without[IN_B].min() > 0.5
         assert (told[IN_B].min() < 0.05) == closes
+
+
+def test_lips_that_cross_are_parted_and_others_left_alone(lips):
+    """Random mouths, some with crossed lips: afterwards none, and those that did not cross untouched."""
+    rng = np.random.default_rng(0)
+    before = np.clip(rng.uniform(-1.0, 0.3, (300, 52)), 0, 1)
+    before[:, ARKIT_NAMES.index("jawOpen")] = rng.uniform(0, 0.4, 300)
+    before[:, ARKIT_NAMES.index("mouthClose")] = before[:, ARKIT_NAMES.index("jawOpen")] + rng.uniform(-0.3, 0.1, 300)
+    before = np.clip(before, 0, 1)
+    crossed = lips.gaps_mm(before).min(axis=1) < -0.01
+    assert 30 < crossed.sum() < 270
+    after = with_lips_apart(before, lips)
+    assert lips.gaps_mm(after).min() > -0.01
+    np.testing.assert_array_equal(
+        after[~crossed & (lips.gaps_mm(before).min(axis=1) > 0)], before[~crossed & (lips.gaps_mm(before).min(axis=1) > 0)]
+    )
+    assert lips.opening_mm(after)[crossed].max() < 3.0
+    assert (after.min(), after.max()) >= (0, 0)
+    assert after.max() <= 1
+
+
+def test_points_of_lips_pressed_together_shut_the_head_and_no_more(rig, lips):
+    """A performer whose points lie 6 mm apart at rest (a moustache) and come 5 mm nearer where the lips press."""
+    own = marker_layout(rig)
+    neutral = np.asarray(own.neutral).reshape(-1, 3).copy()
+    upper, lower = np.array(own.lip_pairs).T
+    neutral[upper, 1] += 6.0
+    layout = Layout(
+        "markers", (*own.names[:-1], "extra"), dict(own.groups), own.lip_pairs, neutral=tuple(neutral.ravel().tolist())
+    )
+    wave = np.concatenate([np.linspace(0, -5, 20), np.linspace(-5, 15, 60)])
+    points = np.tile(neutral, (80, 1, 1))
+    points[:, lower, 1] -= wave[:, None]
+    animation = animate(Motion(points.reshape(80, -1), FPS, layout), rig)
+    gaps, opening = lips.gaps_mm(animation.weights), lips.opening_mm(animation.weights)
+    assert gaps.min() > -0.01
+    assert opening[wave < 0].max() < 0.6
+    assert np.all(np.diff(opening[wave > 1]) > -1e-3), "a wider mouth is wider on the head"
+    np.testing.assert_allclose(opening[wave > 1], wave[wave > 1], atol=2.0)

@@ -128,7 +128,7 @@ def test_landmarks_in_a_picture_move_the_head(rig, talk):
     layout = Layout("landmarks", own.names, own.groups, own.lip_pairs, tuple(rest.ravel().tolist()))
     weights = animate(Motion(flat.reshape(60, -1), 60.0, layout), rig, eyes_gain=0).weights
     shown, asked = (LipGap.of(rig).opening_mm(w) for w in (weights, talk[0]))
-    assert np.abs(shown - asked).max() < 1.0
+    assert np.abs(shown - np.maximum(asked, 0)).max() < 1.0, "lips that would cross touch"
 
 
 def test_the_pose_of_another_face_turns_the_head_about_the_same_place(rig):
