@@ -4,10 +4,13 @@ import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
-COMMAND = [sys.executable, "-c", "from facesynth.cli import main; main()", "corpus", "add"]
+COMMAND = [sys.executable, "-c", "from facesynth.cli import main; main()", "corpus"]
+LEFT_S = 30.0
+"""After the kill, so long may workers take to notice."""
 
 
 def contents(path):
@@ -15,42 +18,82 @@ def contents(path):
     return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
 
 
-def killed_and_repeated(options, tmp_path, times, seed, new=None, forget=None):
-    """Kill the import `times` times at random moments, let it run now and then, compare with an undisturbed run.
+def killed_and_repeated(command, tmp_path, times, seed, new=None, forget=None):
+    """Kill an import `times` times at random moments from its start on, let it run now and then, compare with an undisturbed run.
 
-    new: makes the empty corpus, where the import does not do so itself; forget: folder that is deleted before each corpus.
+    command: the arguments of `facesynth corpus` for a folder. new: makes the empty corpus, where the import does not do so
+    itself; forget: folder that is deleted before each corpus. No process of a killed import may be left.
     """
     new = new or (lambda folder: None)
     new(tmp_path / "whole")
     start = time.monotonic()
-    _finish(tmp_path / "whole", options)
+    _finish(command(tmp_path / "whole"))
     whole_s = time.monotonic() - start
-    wanted = _lasting(tmp_path / "whole")
+    wanted = lasting(tmp_path / "whole")
     rng = np.random.default_rng(seed)
+    killed = 0
     for trial in range(times):
         target = tmp_path / f"killed{trial // 5}"
         if trial % 5 == 0:
             new(target)
             if forget is not None:
                 shutil.rmtree(forget, ignore_errors=True)
-        process = subprocess.Popen(
-            [*COMMAND, str(target), *options, "--jobs", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        try:
-            process.wait(timeout=float(rng.uniform(0.3, 1.0)) * whole_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        killed += _killed([*COMMAND, *command(target)], float(rng.uniform(0, 1)) * whole_s)
         if trial % 5 == 4 or trial == times - 1:
-            _finish(target, options)
-            assert _lasting(target) == wanted
+            _finish(command(target))
+            assert lasting(target) == wanted
+    assert killed >= times / 2, "most of the kills came in time"
 
 
-def _finish(target, options):
-    subprocess.run([*COMMAND, str(target), *options, "--jobs", "1"], check=True, capture_output=True, timeout=180)
+def _killed(command, after_s):
+    """Whether an import was still running when it was to be killed; whatever it had started must end with it."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        process.wait(timeout=after_s)
+        return False
+    except subprocess.TimeoutExpired:
+        family = descendants(process.pid)
+        process.kill()
+        process.wait()
+    patience = time.monotonic() + LEFT_S
+    while left := [pid for pid, born in family.items() if _born(pid) == born]:
+        assert time.monotonic() < patience, f"{len(left)} processes of a killed import are left"
+        time.sleep(0.1)
+    return True
 
 
-def _lasting(folder):
+def descendants(pid):
+    """Processes that a process started, and those started by them, with when they began; none where there is no /proc."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        fields = _stat(path)
+        if fields:
+            parents[int(path.parent.name)] = int(fields[1])
+    found, new = {}, {pid}
+    while new:
+        new = {child for child, parent in parents.items() if parent in new}
+        found |= {child: _born(child) for child in new}
+    return found
+
+
+def _born(pid):
+    """When a process began, in ticks; None where it is no more, or has ended and waits to be looked after."""
+    fields = _stat(Path(f"/proc/{pid}/stat"))
+    return None if not fields or fields[0] == "Z" else fields[19]
+
+
+def _stat(path):
+    try:
+        return path.read_text(encoding="utf-8").rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def _finish(command):
+    subprocess.run([*COMMAND, *command], check=True, capture_output=True, timeout=180)
+
+
+def lasting(folder):
     """What a corpus holds, beside the lock and what a killed write left behind."""
     found = contents(folder)
-    return {name: content for name, content in found.items() if "/.part-" not in name and not name.startswith(".")}
+    return {name: content for name, content in found.items() if "/.part-" not in f"/{name}" and not name.startswith(".")}

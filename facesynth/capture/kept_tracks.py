@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def kept_track(path: str | Path, face: int | None = None) -> Track:
     if track is None:
         track = track_face(path, face)
         with atomic_path(kept) as part, open(part, "wb") as file:
-            np.savez(file, points_px=track.points_px, irises_px=track.irises_px, fps=track.fps)
+            np.savez(file, points_px=track.points_px, irises_px=track.irises_px, fps=track.fps, damaged=track.damaged)
     return track
 
 
@@ -42,6 +43,7 @@ def _read(kept: Path) -> Track | None:
     """The track, or None where there is none or it is damaged."""
     try:
         with open(kept, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]))
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+            damaged = int(stored["damaged"]) if "damaged" in stored else 0
+            return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]), damaged)
+    except (OSError, ValueError, EOFError, KeyError, RuntimeError, zlib.error, zipfile.BadZipFile):
         return None

@@ -31,6 +31,8 @@ class Track:
     irises_px: NDArray[np.float32]
     """[T, 2, 2] middle of the performer's right and left iris in the picture."""
     fps: float
+    damaged: int = 0
+    """How many pictures the file holds damaged, so that parts of them are made up."""
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -53,8 +55,7 @@ def track_face(path: str | Path, face: int | None = None) -> Track:
                 raise FacesynthError(f"{path} has a picture at {time_s:.0f} s; cut it into clips of a sentence or two")
             if slot >= 0 and slot not in seen:
                 seen[slot] = _followed(tracker, image, len(seen) % round(video.fps) == 0, path)
-        fps = video.fps
-    return _track(seen, fps, path)
+    return _track(seen, video.fps, len(video.damaged), path)
 
 
 def _followed(tracker: Tracker, image: Image, is_check: bool, path: Path) -> Seen | None:
@@ -67,14 +68,14 @@ def _followed(tracker: Tracker, image: Image, is_check: bool, path: Path) -> See
         raise FacesynthError(f"{path}: {error}") from None
 
 
-def _track(seen: dict[int, Seen | None], fps: float, path: Path) -> Track:
+def _track(seen: dict[int, Seen | None], fps: float, damaged: int, path: Path) -> Track:
     certain = np.median([face.logit for face in seen.values() if face is not None] or [0.0])
     count = max(seen, default=-1) + 1
     points, irises = np.full((count, POINTS, 3), np.nan, np.float32), np.full((count, 2, 2), np.nan, np.float32)
     for slot, face in seen.items():
         if face is not None and face.logit >= DOUBTFUL * certain:
             points[slot], irises[slot] = face.points, face.irises
-    track = Track(points, irises, fps)
+    track = Track(points, irises, fps, damaged)
     if track.present.sum() < FEWEST_FRAMES:
         raise FacesynthError(
             f"{path} shows a face in {track.present.sum()} of {count} frames; the face should fill a sixth of the picture or more"

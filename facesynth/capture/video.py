@@ -30,6 +30,8 @@ class Pictures:
     """Mean rate, Hz."""
     images: Iterator[tuple[float, Image]]
     """Time since the sound began (s; since the first picture where there is no sound) and picture."""
+    damaged: list[float]
+    """Times of the pictures read so far that the file holds damaged, so that parts of them are made up."""
 
 
 @contextmanager
@@ -42,7 +44,8 @@ def open_video(path: Path) -> Iterator[Pictures]:
     try:
         with av.open(str(path)) as container:
             stream = _stream(container, path)
-            yield Pictures(_rate(stream, path), _decoded(container, stream, path))
+            damaged: list[float] = []
+            yield Pictures(_rate(stream, path), _decoded(container, stream, path, damaged), damaged)
     except FacesynthError:
         raise
     except (av.FFmpegError, ValueError) as error:
@@ -68,7 +71,7 @@ def _rate(stream: Any, path: Path) -> float:
     return float(rate)
 
 
-def _decoded(container: InputContainer, stream: Any, path: Path) -> Iterator[tuple[float, Image]]:
+def _decoded(container: InputContainer, stream: Any, path: Path, damaged: list[float]) -> Iterator[tuple[float, Image]]:
     begin_s = _sound_start_s(container)
     number = 0
     for frame in container.decode(stream):
@@ -76,6 +79,8 @@ def _decoded(container: InputContainer, stream: Any, path: Path) -> Iterator[tup
             continue
         time_s = float(frame.pts * frame.time_base)
         begin_s = time_s if begin_s is None else begin_s
+        if frame.is_corrupt:
+            damaged.append(time_s - begin_s)
         yield time_s - begin_s, _upright(frame)
         number += 1
     if not number:

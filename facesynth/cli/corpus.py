@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,11 +15,14 @@ import click
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
+    from facesynth.corpus.add import AddReport
     from facesynth.corpus.workers import Engine, Workers
     from facesynth.motion.layout import Layout
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
 """Those of a corpus for which nobody says them."""
+MOST_NAMED = 8
+"""So many recordings are named on the screen; import.csv names all."""
 FOLDER = click.Path(file_okay=False, path_type=Path)
 FILE = click.Path(path_type=Path)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -83,20 +87,26 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--text", help="What is said, for one recording.")
 @click.option("--text-file", type=FILE, help="The same, from a file; or for many, CSV with the columns id and text.")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
-@click.option("--emotion", default="neutral", show_default=True, help="Emotion of every recording added.")
+@click.option("--emotion", help="Emotion of every recording added; neutral if nothing says otherwise.")
 @click.option("--emotions", type=FILE, help="Emotion that moves over time, for one recording: CSV, or lines of `end emotion`.")
-@click.option("--intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Intensity of the emotion.")
-@click.option("--take", type=click.IntRange(min=1), default=1, show_default=True, help="Which take of the sentence it is.")
+@click.option("--intensity", type=click.FloatRange(0, 1), help="Intensity of the emotion; 1 otherwise.")
+@click.option("--take", type=click.IntRange(min=1), help="Which take of the sentence it is; the first otherwise.")
 @click.option("--sentence", help="One name for the same words in other emotions and takes; the words themselves otherwise.")
 @click.option("--id", "utterance_id", help="Name of the utterance, for one recording; the file's name otherwise.")
-@click.option("--licence", default="", help="Of these recordings; the corpus' own otherwise.")
-@click.option("--consent", default="", help="Who agreed to what; the corpus' own otherwise.")
+@click.option("--licence", help="Of these recordings; the corpus' own otherwise.")
+@click.option("--consent", help="Who agreed to what; the corpus' own otherwise.")
 @click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
 @click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
 @click.option("--points", is_flag=True, help="Follow salient points of the lower face, for a model that shows the real face.")
 @click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px; it is found otherwise.")
 @click.option("--mask", type=FILE, help="With --points: PNG of the first picture's size, the lower face in white.")
 @click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
+@click.option(
+    "--replace",
+    "replacing",
+    is_flag=True,
+    help="Also phones corrected by hand, and recordings of the same name from another folder.",
+)
 @spread_over
 @as_json
 def add(
@@ -114,6 +124,7 @@ def add(
     box: str | None,
     mask: Path | None,
     performer: str | None,
+    replacing: bool,
     jobs: int,
     engine: Engine,
     address: str,
@@ -124,44 +135,37 @@ def add(
 
     FILES are files or folders. A recording is a video, whose face is captured; or a sound (or a video with sound) and a
     motion file (.npz, .csv) of the same name. Beside them may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd:
-    lines of `start end word`) and NAME.emotions.csv. A FOLDER that is no corpus becomes one that fits the videos.
-    Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated.
+    lines of `start end word`), NAME.emotions.csv, and a CSV with the columns id and text for all of them. A FOLDER that
+    is no corpus becomes one that fits the videos.
+    Without phones and text, the phones are recognised from the sound.
+    A run that was interrupted can be repeated; added again, only what was given otherwise than before is done anew.
+    FOLDER/import.csv says what was used, what was not, and why.
     """
-    from facesynth.corpus import Corpus
     from facesynth.corpus.add import add as add_recordings
-    from facesynth.corpus.record import read_records
-    from facesynth.corpus.transcripts import read_transcripts
+    from facesynth.corpus.record import read_listed
     from facesynth.corpus.workers import Workers
 
     workers = Workers(jobs, engine, address)
-    is_table = text_file is not None and text_file.suffix.lower() == ".csv"
-    known = {**about, "text": text or (_read_text(text_file) if text_file and not is_table else None), "id": utterance_id}
-    listed, texts = (
-        read_records(list_file) if list_file else None,
-        read_transcripts(text_file) if is_table and text_file else None,
-    )
-    if (folder / "corpus.yaml").exists():
-        corpus = Corpus.open(folder)
-        _require_points(corpus, points)
-    elif points or box or mask:
-        corpus = _from_points(folder, files, _header(folder, performer, about), box, mask, face)
-    else:
-        corpus = _from_video(folder, files, performer, face, workers, about)
+    about = {name: value for name, value in about.items() if value is not None}
+    where = (box, mask) if points or box or mask else None
+    corpus = _corpus_for(folder, files, _header(folder, performer, about), where, face, workers)
+    known, texts = _words({**about, "id": utterance_id}, text, text_file)
     report = add_recordings(
         corpus,
         files,
-        {name: value for name, value in known.items() if value is not None},
-        listed=listed,
+        known,
+        listed=read_listed(list_file) if list_file else None,
         texts=texts,
         phones=phones,
         emotions=emotions,
         face=face,
+        replacing=replacing,
         workers=workers,
     )
-    _keep_videos(corpus, files, {*report.added, *report.unchanged}, {name: record.id for name, record in (listed or {}).items()})
-    lines = [f"added {len(report.added)}, already there {len(report.unchanged)}, not usable {len(report.refused)}"]
-    _show(as_json, asdict(report), [*lines, *_listing("not added", report.refused), *_remarks(report.remarks)])
-    _leave_if_nothing(not report.added and not report.unchanged, report.refused, "no recording was added")
+    _keep_videos(corpus, files, report, utterance_id)
+    _show(as_json, asdict(report), _told(corpus, report))
+    done = report.added or report.changed or report.kept or report.unchanged
+    _leave_if_nothing(not done, report.refused, "no recording was added")
 
 
 @corpus_group.command("convert")
@@ -261,22 +265,73 @@ def stats(folder: Path, sentences: Path | None, count: int, pictures: Path | Non
     _show(as_json, facts, [*lines, *([f"{len(drawn)} pictures are in {pictures}"] if drawn else [])])
 
 
-def _from_video(
-    folder: Path, files: tuple[Path, ...], performer: str | None, face: int | None, workers: Workers, about: Mapping[str, Any]
+def _corpus_for(
+    folder: Path,
+    files: tuple[Path, ...],
+    header: Mapping[str, Any],
+    points: tuple[str | None, Path | None] | None,
+    face: int | None,
+    workers: Workers,
 ) -> Corpus:
-    """A new corpus for the performer of videos."""
+    """The corpus in a folder, or a new one for the performer of videos; points: box and mask where they are to be followed."""
+    from facesynth.corpus import Corpus
     from facesynth.corpus.importers.video import corpus_from_video
 
-    return corpus_from_video(folder, files, _header(folder, performer, about), face=face, workers=workers)
+    if (folder / "corpus.yaml").exists():
+        corpus = Corpus.open(folder)
+        _require_points(corpus, points is not None)
+        return corpus
+    if points is not None:
+        return _from_points(folder, files, header, *points, face)
+    return corpus_from_video(folder, files, header, face=face, workers=workers)
 
 
 def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "performer": performer or folder.resolve().name,
-        "emotions": list(dict.fromkeys([*EMOTIONS, about["emotion"]])),
-        "licence": about["licence"],
-        "consent": about["consent"],
+        "emotions": list(dict.fromkeys([*EMOTIONS, about.get("emotion", EMOTIONS[0])])),
+        "licence": about.get("licence", ""),
+        "consent": about.get("consent", ""),
     }
+
+
+def _words(about: Mapping[str, Any], text: str | None, text_file: Path | None) -> tuple[dict[str, Any], dict[str, str] | None]:
+    """What is known of every recording, with the text of the one that is added; and a table of the texts of many."""
+    from facesynth.corpus.transcripts import read_transcripts
+
+    is_table = text_file is not None and text_file.suffix.lower() == ".csv"
+    said = text or (_read_text(text_file) if text_file and not is_table else None)
+    known = {name: value for name, value in {**about, "text": said}.items() if value is not None}
+    return known, read_transcripts(text_file) if text_file and is_table else None
+
+
+def _told(corpus: Corpus, report: AddReport) -> list[str]:
+    """What a person reads after an import."""
+    from facesynth.corpus.account import account_path, phones_from
+
+    counts = {
+        "added": len(report.added),
+        "changed": len(report.changed),
+        "already there": len(report.unchanged),
+        "not usable": len(report.refused),
+    }
+    lines = [", ".join(f"{what} {count}" for what, count in counts.items() if count or what != "changed")]
+    if report.added:
+        minutes = sum(corpus.duration_s(name) for name in report.added) / 60
+        phones = Counter(phones_from(corpus.record(name)) for name in report.added)
+        lines.append(f"added: {_some(report.added)}: {minutes:.1f} minutes, phones {_counted(phones)}")
+    lines += _listing("changed", {name: ", ".join(parts) for name, parts in report.changed.items()})
+    lines += [*_listing("kept", report.kept), *_listing("not added", report.refused), *_remarks(report.remarks)]
+    return [*lines, f"{account_path(corpus)} says so of each recording"]
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    return ", ".join(what if len(counts) == 1 else f"{what} in {count}" for what, count in sorted(counts.items()))
 
 
 def _from_points(
@@ -308,18 +363,19 @@ def _require_points(corpus: Corpus, points: bool) -> None:
         raise FacesynthError(f"{corpus.path} is a corpus of {corpus.layout.kind}; followed points need a corpus of their own")
 
 
-def _keep_videos(corpus: Corpus, files: Iterable[Path], ids: set[str], listed: Mapping[str, str]) -> None:
+def _keep_videos(corpus: Corpus, files: Iterable[Path], report: AddReport, utterance_id: str | None) -> None:
     """The pictures of followed points stay with the corpus: the face is drawn from them."""
     from facesynth.motion.planar import is_tracked
 
     if not is_tracked(corpus.layout):
         return
-    from facesynth.corpus.importers.points import keep_videos
+    from facesynth.corpus.importers.points import forget_videos, keep_videos
     from facesynth.corpus.recordings import VIDEO, find_recordings
 
-    videos = {listed.get(r.name, r.name): r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
-    alone = len(ids) == len(videos) == 1
-    keep_videos(corpus, dict.fromkeys(ids, *videos.values()) if alone else {i: videos[i] for i in sorted(ids) if i in videos})
+    ids = {*report.added, *report.changed, *report.unchanged}
+    videos = {utterance_id or r.name: r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
+    forget_videos(corpus, [name for name, parts in report.changed.items() if "motion" in parts])
+    keep_videos(corpus, {name: videos[name] for name in sorted(ids) if name in videos})
 
 
 def _read_layout(path: Path) -> Layout:

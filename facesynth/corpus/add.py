@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from facesynth.corpus.account import write_account
 from facesynth.corpus.corpus import Corpus
-from facesynth.corpus.motion_files import load_motion
-from facesynth.corpus.record import Record
-from facesynth.corpus.recordings import VIDEO, Recording, find_recordings, words_of
-from facesynth.corpus.signals import hash_signals
+from facesynth.corpus.files import check_id
+from facesynth.corpus.given import Given
+from facesynth.corpus.prepare import Prepared, attempt
+from facesynth.corpus.recordings import Recording, find_recordings, find_tables, words_of
+from facesynth.corpus.transcripts import read_tables
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
-from facesynth.motion.planar import is_tracked
-from facesynth.speech.audio import load_audio
-from facesynth.speech.segments import Segment
-from facesynth.speech.speech import Speech
-
-Task = tuple[Corpus, Record, "Recording", int | None]
-"""Arguments of `prepare`."""
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A recording ready to be written into a corpus."""
-
-    record: Record
-    speech: Speech
-    motion: Motion
-    words: tuple[Segment, ...]
-    aligned: bool
-    """Whether a program placed the phones."""
-    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -43,6 +24,10 @@ class AddReport:
 
     added: tuple[str, ...] = ()
     """Ids that are new."""
+    changed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """What was given otherwise than before, by the id of what was there and was done anew as far as needed."""
+    kept: Mapping[str, str] = field(default_factory=dict)
+    """What stays although something else was given, by id, with how to replace it."""
     unchanged: tuple[str, ...] = ()
     """Ids that were there already."""
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -56,108 +41,90 @@ def add(
     paths: Iterable[str | Path],
     about: Mapping[str, Any] | None = None,
     *,
-    listed: Mapping[str, Record] | None = None,
+    listed: Mapping[str, Mapping[str, Any]] | None = None,
     texts: Mapping[str, str] | None = None,
     phones: Path | None = None,
     emotions: Path | None = None,
     face: int | None = None,
+    replacing: bool = False,
     workers: Workers = ALONE,
 ) -> AddReport:
     """Add every recording in files and folders; those that cannot be used are named with the reason, the others added.
 
-    about: fields of `Record` that hold for every recording; listed: records that hold instead for the recordings of
-    these names; texts: what is said, by name. phones, emotions: files of the one recording that is added. face: which
-    one is captured from video with several, counted from the left. workers: who reads, captures and aligns; the corpus is
-    the same whoever does. Recordings that are there already are passed over, so an interrupted run can be repeated.
+    about: fields of `Record` that hold for every recording; listed: fields that hold instead for the recordings of
+    these names; texts: what is said, by name (else the tables among the files say it). phones, emotions: files of the
+    one recording that is added. face: which one is captured from video with several, counted from the left. workers:
+    who reads, captures and aligns; the corpus is the same whoever does.
+
+    Recordings that are there already are passed over, so an interrupted run can be repeated. Of those of which something
+    is given otherwise than before only that is done anew; what is not given this time stays, and so do phones that were
+    corrected by hand, and recordings of the same name from another folder, unless `replacing`.
     """
+    paths = list(paths)
     recordings, refused = find_recordings(paths)
     about = about or {}
     if len(recordings) > 1 and ("id" in about or about.get("text") or phones or emotions):
         raise FacesynthError(f"id, text, phones and emotions fit one recording, but there are {len(recordings)}; use a list")
-    recordings = [replace(found, phones=phones or found.phones, emotions=emotions or found.emotions) for found in recordings]
-    tasks = []
-    for recording in recordings:
+    tables = read_tables(find_tables(paths), texts, listed)
+    givens = []
+    for found in recordings:
+        recording = replace(found, phones=phones or found.phones, emotions=emotions or found.emotions)
+        facts = {**about, **(listed or {}).get(recording.name, {})}
         try:
-            record = (listed or {}).get(recording.name) or Record(**{"id": recording.name, **about})
-            record = replace(record, text=record.text or (texts or {}).get(recording.name, ""))
-            tasks.append((recording.name, (corpus, _with_text(record, recording.text), recording, face)))
+            givens.append(_given(recording, facts, tables.texts, face))
         except FacesynthError as error:
             refused[recording.name] = str(error)
-    return _kept(corpus, tasks, refused, workers)
+    report = _written(corpus, givens, {**refused, **tables.refused}, replacing, workers)
+    report = replace(report, remarks={**report.remarks, **tables.remarks({recording.name for recording in recordings})})
+    write_account(corpus, givens, paths, report)
+    return report
 
 
-def add_recording(corpus: Corpus, record: Record, recording: Recording, face: int | None = None) -> tuple[bool, tuple[str, ...]]:
-    """Add one recording; returns whether it is new, and what was noticed or done to it."""
-    prepared = prepare(corpus, record, recording, face)
-    return (False, ()) if prepared is None else (True, _keep(corpus, prepared))
+def _given(recording: Recording, facts: Mapping[str, Any], texts: Mapping[str, str], face: int | None) -> Given:
+    """A recording with what is known of it: its words are those stated for it, else of a table, else of a file beside it."""
+    utterance_id = check_id(str(facts.get("id", recording.name)))
+    stated = {name: value for name, value in facts.items() if name != "id"}
+    text = stated.get("text") or texts.get(recording.name) or (words_of(recording.text) if recording.text else "")
+    return Given(recording, utterance_id, {**stated, "text": text} if text else stated, face)
 
 
-def prepare(corpus: Corpus, record: Record, recording: Recording, face: int | None = None) -> Prepared | None:
-    """Read, capture and align one recording, writing nothing; None where the corpus has it already."""
-    motion, remarks = _motion(corpus, recording, face)
-    source_hash = hash_signals(*load_audio(recording.sound), motion)
-    if record.id in corpus and corpus.record(record.id).source_hash == source_hash:
-        return None
-    if record.emotion not in corpus.emotions and recording.emotions is None:
-        raise FacesynthError(f"emotion {record.emotion!r} is none of the corpus' {', '.join(corpus.emotions)}")
-    from facesynth.speech.hearing import hear
-
-    heard = hear(
-        recording.sound,
-        text=record.text or None,
-        phones_path=recording.phones,
-        emotion=record.emotion,
-        emotions_path=recording.emotions,
-        intensity=record.intensity,
-    )
-    record = replace(record, text=record.text or heard.speech.text)
-    aligned = heard.source in ("transcript", "recognition")
-    return Prepared(record, heard.speech, motion, heard.words, aligned, (*remarks, *heard.warnings))
-
-
-def _motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Motion, tuple[str, ...]]:
-    if recording.motion.suffix.lower() not in VIDEO:
-        return load_motion(recording.motion, corpus.layout, corpus.fps)
-    if is_tracked(corpus.layout):
-        from facesynth.corpus.importers.points import motion_from_points
-
-        return motion_from_points(corpus.path, recording.motion, recording.sound, corpus.fps)
-    from facesynth.corpus.importers.video import motion_from_video
-
-    return motion_from_video(recording.motion, recording.sound, corpus.layout, corpus.fps, face)
-
-
-def _kept(corpus: Corpus, tasks: list[tuple[str, Task]], refused: dict[str, str], workers: Workers) -> AddReport:
+def _written(corpus: Corpus, givens: Sequence[Given], refused: Mapping[str, str], replacing: bool, workers: Workers) -> AddReport:
     """Prepare recordings by the workers; write them one after the other, in order, in this one."""
-    added: list[str] = []
-    unchanged: list[str] = []
-    remarks: dict[str, tuple[str, ...]] = {}
-    results = spread(_attempt, [task for _, task in tasks], workers, "adding")
-    for (name, (_, record, _, _)), result in zip(tasks, results, strict=True):
+    report = AddReport(refused=refused)
+    tasks = [(corpus.subset([given.id] if given.id in corpus else []), given, replacing) for given in givens]
+    for given, result in zip(givens, spread(attempt, tasks, workers, "adding"), strict=True):
         try:
             if isinstance(result, FacesynthError):
                 raise result
-            said = () if result is None else _keep(corpus, result)
+            is_new = given.id not in corpus
+            if result is not None:
+                _write(corpus, result)
         except FacesynthError as error:
-            refused[name] = str(error)
+            report = replace(report, refused={**report.refused, given.recording.name: str(error)})
             continue
-        (unchanged if result is None else added).append(record.id)
-        remarks.update({record.id: said} if said else {})
-    return AddReport(tuple(added), tuple(unchanged), refused, remarks)
+        report = _noted(report, given.id, result, is_new)
+    return report
 
 
-def _attempt(task: Task) -> Prepared | FacesynthError | None:
-    try:
-        return prepare(*task)
-    except FacesynthError as error:
-        return error
+def _write(corpus: Corpus, prepared: Prepared) -> None:
+    record, speech, motion = prepared.record, prepared.speech, prepared.motion
+    if record.id not in corpus and motion is not None:
+        corpus.add_utterance(record, speech, motion, prepared.words, aligned=prepared.aligned)
+        return
+    corpus.change_utterance(record, speech, motion, prepared.words, parts=prepared.parts, aligned=prepared.aligned)
 
 
-def _keep(corpus: Corpus, prepared: Prepared) -> tuple[str, ...]:
-    corpus.add_utterance(prepared.record, prepared.speech, prepared.motion, prepared.words, aligned=prepared.aligned)
-    return prepared.remarks
-
-
-def _with_text(record: Record, path: Path | None) -> Record:
-    """The record with the words of the file beside the recording, where it has none of its own."""
-    return replace(record, text=words_of(path)) if path is not None and not record.text else record
+def _noted(report: AddReport, name: str, prepared: Prepared | None, is_new: bool) -> AddReport:
+    """The report with what became of one more recording."""
+    if prepared is None:
+        return replace(report, unchanged=(*report.unchanged, name))
+    remarks = {**report.remarks, name: prepared.remarks} if prepared.remarks else report.remarks
+    report = replace(report, remarks=remarks)
+    if is_new:
+        return replace(report, added=(*report.added, name))
+    if prepared.kept:
+        report = replace(report, kept={**report.kept, name: prepared.kept})
+    if prepared.changed or prepared.parts:
+        what = prepared.changed or tuple(f"{part} (was lost)" for part in sorted(prepared.parts))
+        return replace(report, changed={**report.changed, name: what})
+    return report if prepared.kept else replace(report, unchanged=(*report.unchanged, name))

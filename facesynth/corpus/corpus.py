@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,16 @@ from facesynth.corpus.header import Header, read_header, write_header
 from facesynth.corpus.journal import ADDED, AddedNode, Edit, Journal, node_name, parse_node
 from facesynth.corpus.provenance import duration_s, provenance
 from facesynth.corpus.record import Record, read_records, write_records
-from facesynth.corpus.signals import hash_file, hash_signals, read_motion, read_utterance, write_signals
+from facesynth.corpus.signals import (
+    PARTS,
+    Part,
+    hash_file,
+    hash_signals,
+    lost_parts,
+    read_motion,
+    read_utterance,
+    write_signals,
+)
 from facesynth.corpus.splits import fold_ids, split_ids
 from facesynth.corpus.utterance import Utterance
 from facesynth.errors import FacesynthError, unknown
@@ -203,18 +212,55 @@ class Corpus:
         the corpus holds what it held. Adding the same sound and motion under the same id again changes nothing,
         whatever was corrected by hand since; another recording under that id is refused.
         """
-        self._check_fits(record, speech, motion)
+        self._check_fits(record, speech)
+        self._check_motion(record, motion)
         record = replace(record, source_hash=hash_signals(speech.audio, speech.sample_rate, motion))
         with self._writing() as records:
             old = _same_name(record.id, records)
             if old and (old.id != record.id or old.source_hash != record.source_hash):
                 raise FacesynthError(f"{self.path} has another recording called {old.id!r}; give this one another id")
-            if old is None or not self._is_complete(record.id):
-                write_signals(self.files, record, speech, motion, words)
-                written = hash_file(self.files.phones(record.id)) if aligned else ""
-                records[record.id] = replace(old or record, aligned_hash=written)
+            parts = PARTS if old is None else lost_parts(self.files, record.id)
+            records[record.id] = self._write(old or record, speech, motion, words, parts, aligned)
         self._remember(records[record.id])
         return records[record.id]
+
+    def change_utterance(
+        self,
+        record: Record,
+        speech: Speech,
+        motion: Motion | None = None,
+        words: Sequence[Segment] = (),
+        *,
+        parts: Collection[Part],
+        aligned: bool = False,
+    ) -> Record:
+        """Write some files of an utterance anew and then its line; interrupted at any moment, it can be done again.
+
+        motion: needed where it is among the parts. aligned: whether a program placed the phones, if they are among them.
+        """
+        self.record(record.id)
+        self._check_fits(record, speech)
+        if motion is not None:
+            self._check_motion(record, motion)
+            record = replace(record, source_hash=hash_signals(speech.audio, speech.sample_rate, motion))
+        with self._writing() as records:
+            records[record.id] = self._write(record, speech, motion, words, parts, aligned)
+        self._remember(records[record.id])
+        return records[record.id]
+
+    def _write(
+        self,
+        record: Record,
+        speech: Speech,
+        motion: Motion | None,
+        words: Sequence[Segment],
+        parts: Collection[Part],
+        aligned: bool,
+    ) -> Record:
+        write_signals(self.files, record, speech, motion, words, parts)
+        if "phones" not in parts:
+            return record
+        return replace(record, aligned_hash=hash_file(self.files.phones(record.id)) if aligned else "")
 
     def update(self, record: Record) -> None:
         """Replace an utterance's line in utterances.csv."""
@@ -271,12 +317,14 @@ class Corpus:
         if emotion not in self.emotions:
             raise unknown("emotion", emotion, self.emotions)
 
-    def _check_fits(self, record: Record, speech: Speech, motion: Motion) -> None:
+    def _check_fits(self, record: Record, speech: Speech) -> None:
         for emotion in {record.emotion, *speech.emotions.labels}:
             self._check_emotion(emotion)
         for phone in speech.phones.labels:
             if phone not in PHONES:
                 raise unknown("phone", phone, PHONES)
+
+    def _check_motion(self, record: Record, motion: Motion) -> None:
         if (motion.layout.kind, motion.layout.names) != (self.layout.kind, self.layout.names):
             raise FacesynthError(f"the motion of {record.id!r} has another layout than the corpus")
         if not np.isclose(motion.fps, self.fps, rtol=1e-6):
@@ -288,10 +336,6 @@ class Corpus:
 
     def _remember(self, record: Record) -> None:
         self._records = dict(sorted({**self._records, record.id: record}.items()))
-
-    def _is_complete(self, utterance_id: str) -> bool:
-        wanted = (self.files.audio(utterance_id), self.files.phones(utterance_id), self.files.motion(utterance_id))
-        return all(path.is_file() for path in wanted)
 
     @contextmanager
     def _writing(self) -> Iterator[dict[str, Record]]:

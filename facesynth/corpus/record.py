@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 from facesynth.atomic import write_text
 from facesynth.corpus.files import check_id
@@ -44,6 +44,10 @@ class Record:
     """sha256 of sound and motion as they were added."""
     aligned_hash: str = ""
     """sha256 of the TextGrid that an aligner wrote; empty where a person gave the phones."""
+    given: str = ""
+    """A short hash of each thing that was given of the recording (`facesynth.corpus.given`); empty where that is not known."""
+    remarks: str = ""
+    """What was noticed when it was added: of its motion | of its speech."""
 
     def __post_init__(self) -> None:
         check_id(self.id)
@@ -59,6 +63,8 @@ class Record:
 
 
 COLUMNS = tuple(field.name for field in fields(Record))
+STATED = ("text", "sentence", "emotion", "intensity", "take", "split", "usable", "reason", "licence", "consent")
+"""Columns that a person fills."""
 
 
 def plain_words(text: str) -> str:
@@ -73,6 +79,14 @@ def read_records(path: Path) -> dict[str, Record]:
     if faults:
         raise FacesynthError(f"{path}{faults[0]}")
     return records
+
+
+def read_listed(path: Path) -> dict[str, dict[str, Any]]:
+    """What a table like utterances.csv states of recordings, by their name; an empty cell states nothing."""
+    records = read_records(path)
+    rows = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline=""))
+    stated = {row["id"]: [name for name, value in row.items() if value.strip() and name in STATED] for row in rows}
+    return {name: {field: getattr(record, field) for field in stated[name]} for name, record in records.items()}
 
 
 def parse_records(path: Path) -> tuple[dict[str, Record], list[str]]:
@@ -91,7 +105,7 @@ def write_records(path: Path, records: Iterable[Record]) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    writer.writerows([_cell(getattr(r, name)) for name in COLUMNS] for r in sorted(records, key=lambda r: r.id))
+    writer.writerows([cell(getattr(r, name)) for name in COLUMNS] for r in sorted(records, key=lambda r: r.id))
     write_text(path, text.getvalue())
 
 
@@ -123,7 +137,7 @@ def _record(row: Mapping[str | None, str | None]) -> Record:
     cells = cast("Mapping[str, str]", row)
     return Record(
         **{name: cells[name].strip() for name in ("text", "sentence", "reason", "licence", "consent") if name in cells},
-        **{name: cells[name].strip() for name in ("source_hash", "aligned_hash") if name in cells},
+        **{name: cells[name].strip() for name in ("source_hash", "aligned_hash", "given", "remarks") if name in cells},
         id=cells["id"],
         emotion=cells.get("emotion", "").strip() or "neutral",
         intensity=float(cells.get("intensity") or 1),
@@ -139,7 +153,8 @@ def _truth(cell: str) -> bool:
     return _TRUTHS[cell.strip().casefold()]
 
 
-def _cell(value: object) -> str:
+def cell(value: object) -> str:
+    """A field as utterances.csv spells it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)

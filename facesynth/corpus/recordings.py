@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from facesynth.corpus.transcripts import is_table
 from facesynth.errors import FacesynthError
 from facesynth.speech.textgrid import is_silence_mark
 
@@ -51,7 +52,7 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
     file is both, or the motion where a sound that was recorded separately lies beside it. One sound and one motion file
     alone belong together whatever they are called.
     """
-    files = [file for path in paths for file in _listed(Path(path))]
+    files = [file for path in paths for file in _listed(Path(path)) if not is_table(file)]
     groups: dict[str, dict[str, list[Path]]] = {}
     refused: dict[str, str] = {}
     for file in files:
@@ -70,6 +71,11 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
         else:
             recordings.append(Recording(name, **{kind: files[0] for kind, files in group.items()}))
     return recordings, refused
+
+
+def find_tables(paths: Iterable[str | Path]) -> list[Path]:
+    """Tables among files and in folders that say what is said in recordings, or list them."""
+    return [file for path in paths for file in _listed(Path(path)) if is_table(file)]
 
 
 def _listed(path: Path) -> list[Path]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,38 @@ from facesynth.speech.segments import Segment
 from facesynth.speech.speech import EmotionTrack, Speech
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
 
+Part = Literal["sound", "phones", "emotions", "motion"]
+PARTS: tuple[Part, ...] = ("sound", "phones", "emotions", "motion")
+"""What an utterance has files of; emotions only where they move."""
 
-def write_signals(files: Files, record: Record, speech: Speech, motion: Motion, words: Sequence[Segment]) -> None:
-    """Write every file of an utterance, each atomically."""
-    save_wav(files.audio(record.id), speech.audio, speech.sample_rate)
-    write_textgrid(files.phones(record.id), speech.phones, words)
-    _write_emotions(files.emotions(record.id), record, speech.emotions)
-    write_motion(files.motion(record.id), motion)
+
+def write_signals(
+    files: Files,
+    record: Record,
+    speech: Speech,
+    motion: Motion | None,
+    words: Sequence[Segment],
+    parts: Collection[Part] = PARTS,
+) -> None:
+    """Write the files of an utterance, or some of them, each atomically."""
+    if "sound" in parts:
+        save_wav(files.audio(record.id), speech.audio, speech.sample_rate)
+    if "phones" in parts:
+        write_textgrid(files.phones(record.id), speech.phones, words)
+    if "emotions" in parts:
+        _write_emotions(files.emotions(record.id), record, speech.emotions)
+    if "motion" in parts and motion is not None:
+        write_motion(files.motion(record.id), motion)
+
+
+def lost_parts(files: Files, utterance_id: str) -> frozenset[Part]:
+    """Parts of which the file is not there."""
+    paths: dict[Part, Path] = {
+        "sound": files.audio(utterance_id),
+        "phones": files.phones(utterance_id),
+        "motion": files.motion(utterance_id),
+    }
+    return frozenset(part for part, path in paths.items() if not path.is_file())
 
 
 def read_utterance(files: Files, header: Header, record: Record) -> tuple[Utterance, GapReport]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from errno import EIO
+from io import BytesIO
 from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -75,6 +76,16 @@ def save_wav(path: str | Path, audio: NDArray[np.float32], rate: int) -> None:
             soundfile.write(part, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
         except soundfile.LibsndfileError as error:  # a full disk, a limit on file sizes
             raise OSError(EIO, f"the sound cannot be written ({error})") from error
+
+
+def as_saved(audio: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
+    """What `load_audio` gives back of a mono sound [S] once `save_wav` has written it."""
+    import soundfile
+
+    with BytesIO() as file:
+        soundfile.write(file, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
+        file.seek(0)
+        return np.asarray(soundfile.read(file, dtype="float32")[0], np.float32)
 
 
 def require_sound(audio: NDArray[np.float32], rate: int) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from facesynth.errors import FacesynthError
 from facesynth.speech.audio import load_audio, require_sound
 from facesynth.speech.emotions import NEUTRAL, read_emotions
+from facesynth.speech.phones import SILENCE
 from facesynth.speech.segments import Segment, covering
 from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.textgrid import read_label_lines, read_textgrid
@@ -49,11 +50,34 @@ def hear(
     alignment, else by recognition. Emotions come from the track `emotions_path`, else are one label for the
     whole (neutral if none is given) at an intensity from 0 to 1. FacesynthError says what cannot be used.
     """
-    audio, rate = load_audio(audio_path)
-    require_sound(audio, rate)
+    return hear_sound(
+        *load_audio(audio_path),
+        text=text,
+        phones_path=phones_path,
+        emotion=emotion,
+        emotions_path=emotions_path,
+        intensity=intensity,
+    )
+
+
+def hear_sound(
+    audio: NDArray[np.float32],
+    rate: int,
+    *,
+    text: str | None = None,
+    phones_path: str | Path | None = None,
+    emotion: str | None = None,
+    emotions_path: str | Path | None = None,
+    intensity: float = 1.0,
+) -> Heard:
+    """The same for a sound [S], -1..1, at `rate` Hz."""
+    if phones_path is None:
+        require_sound(audio, rate)
     duration_s = len(audio) / rate
     emotions = _emotions(emotion, emotions_path, intensity, duration_s)
     phones, words, warnings, source = _phones(audio, rate, text, phones_path)
+    if set(phones.labels) != {SILENCE}:  # who says that nobody speaks may give a sound without any
+        require_sound(audio, rate)
     spoken = text if text is not None else " ".join(word for word, _, _ in words)
     return Heard(Speech(audio, rate, phones, emotions, spoken), words, warnings, source)
 

@@ -1,5 +1,4 @@
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,7 +38,7 @@ def contents(path) -> dict[str, bytes]:
 
 def test_a_folder_in_one_go(session, tmp_path):
     corpus = new_corpus(tmp_path / "c")
-    listed = {record.id: replace(record, text="") for record, *_ in tiny_utterances(3)}
+    listed = {record.id: {"emotion": record.emotion, "take": record.take} for record, *_ in tiny_utterances(3)}
     report = add(corpus, [session], listed=listed)
     assert (len(report.added), report.unchanged, report.refused) == (3, (), {})
     for record, speech, motion in tiny_utterances(3):
@@ -174,13 +173,20 @@ def test_an_emotion_that_the_corpus_lacks_is_refused_before_anything_is_heard(se
     assert "emotion 'bored' is none of the corpus'" in report.refused["s00_happy_t1"]
 
 
-def test_another_recording_of_the_same_name_is_refused(session, tmp_path):
+def test_another_recording_of_the_same_name_from_another_folder_is_refused(session, tmp_path):
     corpus = new_corpus(tmp_path / "c")
     add(corpus, [session])
-    shutil.copy(session / "s00_neutral_t2.wav", session / "s00_happy_t1.wav")
-    report = add(corpus, [session])
-    assert len(report.unchanged) == 2
-    assert "another recording" in report.refused["s00_happy_t1"]
+    before = contents(corpus.path / "motion")
+    other = tmp_path / "Tag 2"
+    other.mkdir()
+    for suffix in (".wav", ".npz", ".TextGrid"):
+        shutil.copy(session / f"s00_neutral_t2{suffix}", other / f"s00_happy_t1{suffix}")
+    report = add(corpus, [other])
+    assert "another recording called 's00_happy_t1'" in report.refused["s00_happy_t1"]
+    assert contents(corpus.path / "motion") == before
+    assert add(corpus, [other], replacing=True).changed["s00_happy_t1"] == ("motion", "phones", "sound")
+    again = contents(corpus.path / "motion")
+    assert again["s00_happy_t1.npz"] == again["s00_neutral_t2.npz"] != before["s00_happy_t1.npz"]
 
 
 def test_what_fits_one_recording_is_refused_for_many(session, tmp_path):

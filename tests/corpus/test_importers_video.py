@@ -92,7 +92,23 @@ def test_killed_fifty_times_while_following_faces_gives_the_same_corpus(clips, t
     monkeypatch.setenv("FACESYNTH_CACHE", str(tmp_path / "cache"))
     shutil.copytree(models, tmp_path / "cache" / "landmarks")
     options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--performer", "A"]
-    killed_and_repeated(options, tmp_path, 50, seed=6, forget=tmp_path / "cache" / "tracks")
+    killed_and_repeated(
+        lambda target: ["add", str(target), *options, "--jobs", "2"], tmp_path, 50, seed=6, forget=tmp_path / "cache" / "tracks"
+    )
+
+
+def test_damaged_pictures_are_told(clips, tmp_path):
+    corpus = corpus_from_video(tmp_path / "c", [clips], {"performer": "A", "emotions": ["neutral"]})
+    assert "damaged" not in str(add(corpus, [clips / "bgbsza.mpg"]).remarks)
+    content = bytearray((clips / "lrbi7p.mpg").read_bytes())
+    rng = np.random.default_rng(1)
+    for place in rng.integers(2000, len(content), 40):
+        content[place] = rng.integers(256)
+    (clips / "hurt.mpg").write_bytes(content)
+    report = add(corpus, [clips / "hurt.mpg"], {"text": LINES["lrbi7p"]})
+    assert report.added == ("hurt",)
+    assert any("pictures are damaged in the file" in remark for remark in report.remarks["hurt"])
+    assert "pictures are damaged" in (corpus.path / "import.csv").read_text(encoding="utf-8")
 
 
 def test_another_rate_is_resampled_and_another_layout_refused(clips):

@@ -1,3 +1,8 @@
+"""Imports that are killed, by two workers and by Ray, and conversions: run again they give the same bytes."""
+
+import importlib.util
+from functools import partial
+
 import numpy as np
 import pytest
 from corpora import tiny_layout, tiny_utterances
@@ -24,10 +29,42 @@ def new(folder):
     Corpus.create(folder, performer="A", layout=tiny_layout(), fps=120, emotions=["neutral"])
 
 
+def adding(session, target, *options):
+    return ["add", str(target), str(session), *options]
+
+
 def test_killed_five_times_and_run_again_gives_the_same_bytes(session, tmp_path):
-    killed_and_repeated([str(session)], tmp_path, 5, seed=5, new=new)
+    killed_and_repeated(lambda target: adding(session, target, "--jobs", "2"), tmp_path, 5, seed=5, new=new)
 
 
 @pytest.mark.slow
 def test_killed_fifty_times_and_run_again_gives_the_same_bytes(session, tmp_path):
-    killed_and_repeated([str(session)], tmp_path, 50, seed=7, new=new)
+    killed_and_repeated(lambda target: adding(session, target, "--jobs", "2"), tmp_path, 50, seed=7, new=new)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="ray is not installed: pip install 'facesynth[ray]'")
+def test_killed_while_ray_works_and_run_again_gives_the_same_bytes(session, tmp_path):
+    command = partial(adding, session)
+    killed_and_repeated(lambda target: command(target, "--jobs", "2", "--engine", "ray"), tmp_path, 10, seed=9, new=new)
+
+
+def converting(session, tmp_path):
+    layout = tmp_path / "layout.yaml"
+    layout.write_text(_yaml(), encoding="utf-8")
+    return lambda target: ["convert", str(session), "--layout", str(layout), "-o", str(target)]
+
+
+def _yaml():
+    import yaml
+
+    return yaml.safe_dump(tiny_layout().to_dict())
+
+
+def test_a_conversion_killed_twice_and_run_again_gives_the_same_bytes(session, tmp_path):
+    killed_and_repeated(converting(session, tmp_path), tmp_path, 2, seed=3)
+
+
+@pytest.mark.slow
+def test_a_conversion_killed_fifty_times_and_run_again_gives_the_same_bytes(session, tmp_path):
+    killed_and_repeated(converting(session, tmp_path), tmp_path, 50, seed=4)

@@ -108,6 +108,15 @@ def keep_videos(corpus: Corpus, videos: Mapping[str, Path]) -> None:
             save_shapes(target.with_suffix(".npz"), *kept_shapes(video, reference))
 
 
+def forget_videos(corpus: Corpus, ids: Iterable[str]) -> None:
+    """Delete the kept videos of utterances that were recorded anew."""
+    for utterance_id in ids:
+        for suffix in sorted(VIDEO):
+            path = _video_path(corpus.path, utterance_id, suffix)
+            path.with_suffix(".npz").unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
+
+
 def kept_videos(corpus: Corpus) -> dict[str, Path]:
     """The video of each usable utterance that has one kept."""
     found = {}

@@ -65,6 +65,10 @@ def motion_from_video(
     remarks = []
     if share < 1:
         remarks.append(f"no face is seen in {np.count_nonzero(~track.present)} of {len(track.present)} frames")
+    if track.damaged:
+        remarks.append(
+            f"{track.damaged} of {len(track.present)} pictures are damaged in the file, in part made up; is there a better copy?"
+        )
     motion = motion_of(track, layout)
     if sound != video:
         clock = clock_between(*load_audio(video), *load_audio(sound))
