@@ -20,9 +20,11 @@ RATE = 1000
 """Envelopes are compared at so many values a second: the offset is known to a millisecond."""
 SMOOTH_S = 0.004
 WINDOW_S = 10.0
-"""Drift is read off pieces of this length; shorter recordings have none that matters."""
+"""Drift is read off pieces of this length, at least two of them; shorter recordings are too short to tell."""
 SLACK_S = 0.5
 """So far may the pieces' offsets differ."""
+INSIDE = 0.9
+"""Share of a clip that must lie within a recorder's sound."""
 LEAST_MATCH = 0.3
 """Correlation of the envelopes below which two sounds are not of the same event."""
 
@@ -33,8 +35,17 @@ class Clock:
 
     offset_s: float
     drift: float
+    """0 where it is not known."""
     match: float
     """Correlation of the two sounds' envelopes, -1..1."""
+    drift_known: bool = True
+    """Whether the recording was long enough to tell the drift."""
+
+    def __str__(self) -> str:
+        drift = (
+            f"drift {self.drift * 1e6:+.0f} ppm" if self.drift_known else f"too short to tell a drift (under {2 * WINDOW_S:g} s)"
+        )
+        return f"moved by {self.offset_s * 1000:+.0f} ms to the separate sound, {drift}"
 
 
 def clock_between(camera: NDArray[np.float32], camera_rate: int, sound: NDArray[np.float32], sound_rate: int) -> Clock:
@@ -48,9 +59,36 @@ def clock_between(camera: NDArray[np.float32], camera_rate: int, sound: NDArray[
         )
     middles, offsets = _piecewise(theirs, ours, offset)
     if len(middles) < 2:
-        return Clock(offset / RATE, 0.0, match)
+        return Clock(offset / RATE, 0.0, match, drift_known=False)
     drift, start = np.polyfit(middles, offsets, 1)
     return Clock(float(start) / RATE, float(drift), match)
+
+
+@dataclass(frozen=True, eq=False)
+class Recorder:
+    """A sound that ran on while several clips were filmed."""
+
+    audio: NDArray[np.float32]
+    """[S]"""
+    sample_rate: int
+    envelope: Floats
+    """How its loudness rises and falls."""
+
+    @classmethod
+    def of(cls, audio: NDArray[np.float32], sample_rate: int) -> Recorder:
+        """A recorder's sound, ready to be searched."""
+        return cls(audio, sample_rate, _envelope(audio, sample_rate))
+
+    def part_of(self, camera: NDArray[np.float32], camera_rate: int) -> NDArray[np.float32]:
+        """The sound while a camera recorded its own [S']; FacesynthError where it is nowhere in it."""
+        theirs = _envelope(camera, camera_rate)
+        lag, match = _offset(theirs, self.envelope, least_overlap=INSIDE)
+        if match < LEAST_MATCH:
+            raise FacesynthError(
+                f"the clip's own sound is nowhere in the recorder's (best correlation {match:.2f}, wanted {LEAST_MATCH})"
+            )
+        first, stop = (max(round(place / RATE * self.sample_rate), 0) for place in (lag, lag + len(theirs)))
+        return self.audio[first:stop]
 
 
 def on_clock(motion: Motion, clock: Clock) -> Motion:
@@ -72,12 +110,18 @@ def _envelope(audio: NDArray[np.float32], rate: int) -> Floats:
     return np.gradient(level) if len(level) > 1 else level
 
 
-def _offset(theirs: Floats, ours: Floats) -> tuple[int, float]:
-    """By how many values `ours` lies later than `theirs`, and how well they then match."""
+def _offset(theirs: Floats, ours: Floats, least_overlap: float = 0.0) -> tuple[int, float]:
+    """By how many values `ours` lies later than `theirs`, and how well they then match.
+
+    least_overlap: share of `theirs` that must lie within `ours`.
+    """
+    if len(ours) < least_overlap * len(theirs):
+        raise FacesynthError("the recorder's sound is shorter than the clip")
     if min(len(theirs), len(ours)) < RATE // 5:
         raise FacesynthError("a sound of under 0.2 s cannot be matched with another")
     products = correlate(ours, theirs, mode="full")
-    lag = int(products.argmax()) - (len(theirs) - 1)
+    outside = int(least_overlap * len(theirs))
+    lag = int(products[outside : len(products) - outside].argmax()) + outside - (len(theirs) - 1)
     first, stop = max(lag, 0), min(len(ours), len(theirs) + lag)
     a, b = ours[first:stop], theirs[first - lag : stop - lag]
     spread = np.sqrt((a @ a) * (b @ b))

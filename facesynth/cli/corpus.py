@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
+
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.corpus.add import AddReport
     from facesynth.corpus.workers import Engine, Workers
-    from facesynth.motion.layout import Layout
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
 """Those of a corpus for which nobody says them."""
@@ -67,7 +68,8 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
     from facesynth.corpus import Corpus
 
     names = [name.strip() for name in emotions.split(",") if name.strip()]
-    corpus = Corpus.create(folder, layout=_read_layout(layout_file), emotions=names, **about)
+    corpus = Corpus.create(folder, layout=read_layout(layout_file), emotions=names, **about)
+    keep_written_of(folder, layout_file)
     facts = {
         "path": str(corpus.path),
         "performer": corpus.performer,
@@ -107,6 +109,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
     is_flag=True,
     help="Also phones corrected by hand, and recordings of the same name from another folder.",
 )
+@said_of_files
 @spread_over
 @as_json
 def add(
@@ -125,6 +128,9 @@ def add(
     mask: Path | None,
     performer: str | None,
     replacing: bool,
+    layout_file: Path | None,
+    fps: float | None,
+    axes: str,
     jobs: int,
     engine: Engine,
     address: str,
@@ -134,12 +140,11 @@ def add(
     """Add recordings to the corpus in FOLDER.
 
     FILES are files or folders. A recording is a video, whose face is captured; or a sound (or a video with sound) and a
-    motion file (.npz, .csv) of the same name. Beside them may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd:
-    lines of `start end word`), NAME.emotions.csv, and a CSV with the columns id and text for all of them. A FOLDER that
-    is no corpus becomes one that fits the videos.
-    Without phones and text, the phones are recognised from the sound.
-    A run that was interrupted can be repeated; added again, only what was given otherwise than before is done anew.
-    FOLDER/import.csv says what was used, what was not, and why.
+    motion file (.npz, .csv, .c3d, .mat, Live Link Face) of the same name, or one that holds the sound itself. Beside them
+    may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd: lines of `start end word`), NAME.emotions.csv, and a CSV
+    with the columns id and text for all of them. A FOLDER that is no corpus becomes one that fits the recordings.
+    Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated; added
+    again, only what was given otherwise than before is done anew. FOLDER/import.csv says what was used, what not, and why.
     """
     from facesynth.corpus.add import add as add_recordings
     from facesynth.corpus.record import read_listed
@@ -147,8 +152,8 @@ def add(
 
     workers = Workers(jobs, engine, address)
     about = {name: value for name, value in about.items() if value is not None}
-    where = (box, mask) if points or box or mask else None
-    corpus = _corpus_for(folder, files, _header(folder, performer, about), where, face, workers)
+    where, said = (box, mask) if points or box or mask else None, Said(layout_file, fps, axes)
+    corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about), where, face, said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)
     report = add_recordings(
         corpus,
@@ -163,7 +168,7 @@ def add(
         workers=workers,
     )
     _keep_videos(corpus, files, report, utterance_id)
-    _show(as_json, asdict(report), _told(corpus, report))
+    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *_told(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
     _leave_if_nothing(not done, report.refused, "no recording was added")
 
@@ -171,31 +176,23 @@ def add(
 @corpus_group.command("convert")
 @click.argument("files", nargs=-1, required=True, type=FILE)
 @click.option("-o", "--output", "folder", type=FOLDER, required=True, help="Folder for the files made.")
-@click.option(
-    "--layout",
-    "layout_file",
-    type=FILE,
-    help="YAML or JSON that names channels and groups; what files say themselves, otherwise.",
-)
-@click.option("--fps", type=click.FloatRange(1, 1000), help="Rate of files that do not state theirs.")
-@click.option(
-    "--axes", default="x,y,z", show_default=True, help="C3D: axes that run to the performer's left, up, and out of the face."
-)
+@said_of_files
 @as_json
 def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps: float | None, axes: str, as_json: bool) -> None:
-    """Turn recordings of other systems into files for `corpus add`.
+    """Turn recordings of other systems into plain files, for those who want files; `corpus add` reads them itself.
 
     FILES are files or folders of C3D, Live Link Face CSV, articulography (MVIEW .mat), BEAT2 poses, or CSV, NPZ and MAT of
-    any points or curves (named by --layout, or by channels.txt beside them). Motion, and sound and phones where the files
-    hold them, are written to the output folder, with a layout.yaml for `corpus new --layout`.
+    any points or curves (named by --layout, or by layout.yaml or channels.txt beside them). Motion, and sound, phones and
+    words in or beside the files, are written to the output folder, with a layout.yaml for `corpus new --layout`.
     """
-    from facesynth.corpus.importers.convert import LAYOUT
     from facesynth.corpus.importers.convert import convert as convert_files
+    from facesynth.corpus.importers.description import LAYOUT
 
-    report = convert_files(files, folder, layout=_read_layout(layout_file) if layout_file else None, fps=fps, axes=axes)
+    report = convert_files(files, folder, description=Said(layout_file, fps, axes).description(), fps=fps)
     lines = [f"converted {len(report.converted)}, not usable {len(report.refused)}"]
     if report.converted:
         lines.append(f"make their corpus with `facesynth corpus new NAME --layout {folder / LAYOUT} --fps {report.fps:g} …`")
+    lines += report.guessed
     _show(as_json, asdict(report), [*lines, *_listing("not converted", report.refused), *_remarks(report.remarks)])
     _leave_if_nothing(not report.converted, report.refused, "nothing was converted")
 
@@ -271,19 +268,26 @@ def _corpus_for(
     header: Mapping[str, Any],
     points: tuple[str | None, Path | None] | None,
     face: int | None,
+    said: Said,
     workers: Workers,
-) -> Corpus:
-    """The corpus in a folder, or a new one for the performer of videos; points: box and mask where they are to be followed."""
+) -> tuple[Corpus, tuple[str, ...]]:
+    """The corpus in a folder, or a new one for the performer of recordings, and what was guessed of them.
+
+    points: box and mask where they are to be followed.
+    """
     from facesynth.corpus import Corpus
     from facesynth.corpus.importers.video import corpus_from_video
 
     if (folder / "corpus.yaml").exists():
         corpus = Corpus.open(folder)
         _require_points(corpus, points is not None)
-        return corpus
+        said.require_nothing()
+        return corpus, ()
     if points is not None:
-        return _from_points(folder, files, header, *points, face)
-    return corpus_from_video(folder, files, header, face=face, workers=workers)
+        return _from_points(folder, files, header, *points, face), ()
+    if (made := said.corpus(folder, files, header, workers)) is not None:
+        return made
+    return corpus_from_video(folder, files, header, face=face, workers=workers), ()
 
 
 def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> dict[str, Any]:
@@ -376,23 +380,6 @@ def _keep_videos(corpus: Corpus, files: Iterable[Path], report: AddReport, utter
     videos = {utterance_id or r.name: r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
     forget_videos(corpus, [name for name, parts in report.changed.items() if "motion" in parts])
     keep_videos(corpus, {name: videos[name] for name in sorted(ids) if name in videos})
-
-
-def _read_layout(path: Path) -> Layout:
-    import yaml
-
-    from facesynth.errors import FacesynthError
-    from facesynth.motion.layout import Layout
-
-    try:
-        plain = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
-        return Layout.from_dict(plain.get("layout", plain))
-    except FileNotFoundError:
-        raise FacesynthError(f"{path}: no such layout file") from None
-    except KeyError as error:
-        raise FacesynthError(f"{path}: {error} is missing; a layout needs kind and names") from None
-    except (yaml.YAMLError, OSError, TypeError, AttributeError, ValueError) as error:
-        raise FacesynthError(f"{path} is not a layout: {' '.join(str(error).split())}") from None
 
 
 def _read_text(path: Path) -> str:

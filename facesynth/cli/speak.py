@@ -13,7 +13,7 @@ import click
 from facesynth.cli.feeling import AUTO, account, asks_to_listen, feeling_options, mapping, spoken_feeling
 from facesynth.cli.own_rig import as_arkit, own_head, own_rig_options
 from facesynth.cli.recordings import recordings
-from facesynth.cli.targets import plan_targets, write_phones
+from facesynth.cli.targets import plan_targets, require_free, write_phones
 from facesynth.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
@@ -121,7 +121,9 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
     paths = recordings(speech)
     if len(paths) > 1:
         _require_batch(outputs, options)
-    plan = plan_targets(paths, outputs, [path for path in speech if path.is_dir()])
+    plan = plan_targets(paths, outputs, [path for path in speech if path.is_dir()], _read_files(model, options))
+    if options["explain"]:
+        require_free(options["explain"], [*paths, *_read_files(model, options)])
     size = parse_size(options["size"])
     method = load(model)
     _check_feeling(method, options)
@@ -131,6 +133,13 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
         click.echo(json.dumps(result) if as_json else "", nl=as_json)
         return
     _speak_all(method, plan, size, options, as_json)
+
+
+def _read_files(model: Path, options: dict[str, Any]) -> list[Path]:
+    """What is read beside the speech: the model, its speaker's pictures, and every file that was given."""
+    given = [value for name, value in options.items() if isinstance(value, Path) and name not in ("explain", "face_of")]
+    parts = [path for folder in given if folder.is_dir() for path in sorted(folder.iterdir())]
+    return [model, model.with_name(f"{model.stem}.face.npz"), *given, *parts]
 
 
 def _speak_all(

@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from facesynth.corpus import Corpus
 
 
 @click.command("train")
@@ -49,6 +53,7 @@ def train(
         return
     model = create(method, **chosen)
     recordings = Corpus.open(corpus)
+    _require_speech(recordings)
     if split == "train":
         recordings, _ = recordings.split(seed)
     start = time.perf_counter()
@@ -77,3 +82,15 @@ def train(
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+
+
+def _require_speech(recordings: Corpus) -> None:
+    """FacesynthError, with the reasons, where no recording is usable."""
+    from facesynth.errors import FacesynthError
+
+    if not len(recordings) and recordings.records:
+        reasons = list(dict.fromkeys(record.reason or "marked unusable" for record in recordings.records))
+        raise FacesynthError(
+            f"none of the {len(recordings.records)} recordings of {recordings.path} teaches speech ({'; '.join(reasons[:3])});"
+            " `facesynth corpus stats` says what they hold"
+        )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.cells import read_cells
+from facesynth.corpus.importers.description import Written
 from facesynth.corpus.npz import read_npz
 from facesynth.errors import FacesynthError, unknown
 from facesynth.motion.layout import Layout
@@ -18,35 +20,64 @@ from facesynth.motion.resample import resample
 
 AXES = ("x", "y", "z")
 TIME = "time_s"
+TIMES = frozenset({TIME, "time", "seconds", "timestamp_s", "time_ms"})
+"""Columns of times, in lower case; those that end in ms hold milliseconds."""
 ROUNDING_S = 0.001
-USUAL_FPS = (24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 90, 100, 120, 150, 200, 240)
+USUAL_FPS = (24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 90, 100, 120, 150, 200, 240, 250, 300, 400, 500)
 """Rates of cameras and capture systems, Hz."""
 
 
-def load_motion(path: str | Path, layout: Layout, fps: float) -> tuple[Motion, tuple[str, ...]]:
+def load_motion(path: str | Path, layout: Layout, fps: float, written: Written | None = None) -> tuple[Motion, tuple[str, ...]]:
     """Motion from a file in the corpus' layout and at its rate, the head's motion taken out; and what was done to it.
 
     NPZ: frames [T, K, dimension] or [T, C], and if there are any fps, head [T, 6], eyes [T, 3]. CSV: a column for each
     channel (`chin.x`, `chin.y`, …, or a curve's name), empty cells where a sample is missing, and if there is one
     `time_s`. Where nothing states the file's rate it is the corpus' own. Head motion is taken out where the file does
-    not hold it separately and the layout says which points are rigid.
+    not hold it separately and the layout says which points are rigid. written: how a CSV is written.
     """
     path = Path(path)
-    arrays = _from_csv(path, layout, fps) if path.suffix.lower() == ".csv" else read_npz(path)
-    remarks = list(arrays.pop("remarks", ()))
-    file_fps = arrays.get("fps", fps)
-    try:
-        motion = Motion(_flat(arrays["frames"], layout), file_fps, layout, arrays.get("head"), arrays.get("eyes"))
-    except ValueError as error:
-        raise FacesynthError(f"{path}: {error}") from None
+    if path.suffix.lower() == ".csv":
+        motion, remarks = read_csv(path, layout, fps, written)
+    else:
+        arrays = read_npz(path)
+        try:
+            file_fps = arrays.get("fps", fps)
+            motion = Motion(_flat(arrays["frames"], layout), file_fps, layout, arrays.get("head"), arrays.get("eyes"))
+        except ValueError as error:
+            raise FacesynthError(f"{path}: {error}") from None
+        remarks = ()
     if not len(motion) or np.isinf(motion.frames).any():
         raise FacesynthError(f"{path} holds no frames, or infinite values; export it again")
+    fitted, more = into_corpus(motion, layout, fps)
+    return fitted, (*remarks, *more)
+
+
+def into_corpus(motion: Motion, layout: Layout, fps: float) -> tuple[Motion, tuple[str, ...]]:
+    """A motion with the same points or curves in the corpus' layout and at its rate, the head's motion taken out."""
+    motion, said = with_points_of(layout, motion)
+    remarks = list(said)
     motion, remark = _without_head(motion)
     remarks += [remark] * bool(remark)
-    if not np.isclose(file_fps, fps, rtol=1e-6):
-        remarks.append(f"resampled from {file_fps:g} to {fps:g} fps")
+    if not np.isclose(motion.fps, fps, rtol=1e-6):
+        remarks.append(f"resampled from {motion.fps:g} to {fps:g} fps")
         motion = resample(motion, fps)
     return Motion(motion.frames, fps, layout, motion.head, motion.eyes), tuple(remarks)
+
+
+def with_points_of(layout: Layout, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
+    """A motion with the points or curves of a layout, found by name, in its order; FacesynthError where it lacks some."""
+    own = motion.layout
+    if own.kind != layout.kind:
+        raise FacesynthError(f"it holds {own.kind}, not {layout.kind}; those need a corpus of their own")
+    places = {name: number for number, name in enumerate(own.names)}
+    lacking = [name for name in layout.names if name not in places]
+    if lacking:
+        near = unknown(layout.kind.rstrip("s"), lacking[0], own.names)
+        raise FacesynthError(f"{len(lacking)} of the {len(layout.names)} {layout.kind} wanted are not in it: {near}")
+    left = len(own.names) - len(layout.names)
+    remarks = (f"{left} {own.kind} that the corpus does not have were left out",) if left else ()
+    points = motion.points[:, [places[name] for name in layout.names]]
+    return Motion(points.reshape(len(motion), layout.channels), motion.fps, layout, motion.head, motion.eyes), remarks
 
 
 def channel_names(layout: Layout) -> tuple[str, ...]:
@@ -56,47 +87,67 @@ def channel_names(layout: Layout) -> tuple[str, ...]:
     return tuple(f"{name}.{axis}" for name in layout.names for axis in AXES[: layout.dimension])
 
 
-def own_rate(path: str | Path) -> float:
-    """The rate, Hz, of a CSV with the column `time_s`."""
-    columns, table = _table(Path(path))
-    if TIME not in columns:
-        raise FacesynthError(f"{path} has no column {TIME}, so its rate is not known")
-    times_s = table[:, columns.index(TIME)]
-    span_s = float(times_s[-1] - times_s[0]) if len(times_s) > 1 else 0.0
-    if not span_s > 0:
-        raise FacesynthError(f"{path}: the column {TIME} does not go up; resample the motion first")
-    return _rate(Path(path), times_s, (len(times_s) - 1) / span_s)
+def read_csv(
+    path: Path, layout: Layout, fps: float, written: Written | None = None, *, only_own_rate: bool = False
+) -> tuple[Motion, tuple[str, ...]]:
+    """Motion [T, C] of a CSV in a layout, head motion still in, and what was noticed.
 
-
-def _from_csv(path: Path, layout: Layout, fps: float) -> dict[str, Any]:
-    columns, table = _table(path)
+    Columns are found by name, whatever signs join point and axis; without names they are taken in order. The rate is
+    that of the column of times, else `fps`. only_own_rate: a FacesynthError where there are no times.
+    """
+    written = written or Written()
+    columns, table = read_cells(path, written.separator, written.decimal)
     wanted = channel_names(layout)
-    for channel in wanted:
-        if channel not in columns:
-            raise FacesynthError(f"{path} lacks a column: {unknown('column', channel, columns)}")
-    others = [column for column in columns if column not in wanted and column != TIME]
-    remarks = [f"columns that the layout does not have were left out: {', '.join(others)}"] if others else []
-    arrays: dict[str, Any] = {"frames": table[:, [columns.index(channel) for channel in wanted]], "remarks": remarks}
-    if TIME in columns:
-        arrays["fps"] = _rate(path, table[:, columns.index(TIME)], fps)
-    return arrays
-
-
-def _table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
-    """Names of the columns, and the numbers [T, columns]; NaN for empty cells."""
+    if not columns and len(table) and table.shape[1] == len(wanted):
+        places, time = list(range(len(wanted))), None
+        remarks: list[str] = ["the columns have no names; they were taken in the layout's order"]
+    else:
+        time = time_column(columns, written, wanted)
+        places = [_column(path, channel, columns) for channel in wanted]
+        others = [name for k, name in enumerate(columns) if k not in places and name != time]
+        remarks = [f"columns that the layout does not have were left out: {shortened(others)}"] if others else []
+    if time is None and only_own_rate:
+        raise FacesynthError(f"{path} does not state its rate: give it (--fps), or a column {TIME}")
+    if time is not None:
+        fps = _rate(path, table[:, columns.index(time)] * (0.001 if time.lower().endswith("ms") else 1.0), fps)
+    frames = table[:, places]
+    if layout.dimension > 1:
+        frames = written.placed(layout.points(frames)).reshape(frames.shape)
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            columns, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row] or [[]]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error}); export it again") from None
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(columns):
-            raise FacesynthError(f"{path}, line {number}: {len(row)} cells, but {len(columns)} columns")
-    try:
-        table = np.array([[float(cell or "nan") for cell in row] for row in rows])
+        return Motion(frames.astype(np.float32), fps, layout), tuple(remarks)
     except ValueError as error:
-        raise FacesynthError(f"{path}: {error}; wanted numbers below the names of the columns") from None
-    return columns, table.reshape(len(rows), len(columns))
+        raise FacesynthError(f"{path}: {error}") from None
+
+
+def time_column(columns: Sequence[str], written: Written, channels: Sequence[str] = ()) -> str | None:
+    """The column that holds times: the one that was named, else one of a usual name that is no channel."""
+    if written.time:
+        if written.time not in columns:
+            raise unknown("column of times", written.time, columns)
+        return written.time
+    return next((name for name in columns if name.lower() in TIMES and name not in channels), None)
+
+
+def shortened(names: Sequence[str], most: int = 5) -> str:
+    """The first names of a list, and how many there are beyond."""
+    shown = ", ".join(name if len(name) <= 40 else f"{name[:40]}…" for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _column(path: Path, channel: str, columns: Sequence[str]) -> int:
+    """The column of a channel: by its name, else by its letters and digits alone, if that is clear."""
+    if channel in columns:
+        return columns.index(channel)
+    like = [k for k, name in enumerate(columns) if _plain(name) == _plain(channel)]
+    if len(like) == 1:
+        return like[0]
+    if not columns:
+        raise FacesynthError(f"{path} lacks a column: unknown column {channel!r}; its first line does not name the columns")
+    raise FacesynthError(f"{path} lacks a column: {unknown('column', channel, [name[:40] for name in columns])}")
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
 def _rate(path: Path, times_s: NDArray[np.float64], fps: float) -> float:

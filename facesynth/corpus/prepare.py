@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.given import DIGITS, FOLDER, GRID, Given, changes, in_words, read_prints, write_prints
-from facesynth.corpus.motion_files import load_motion
+from facesynth.corpus.importers.unpack import read_into, unpacked, with_unpacked
+from facesynth.corpus.limits import LONGEST_DIFFERENCE_S, MOST_MISSING
 from facesynth.corpus.record import Record
 from facesynth.corpus.recordings import VIDEO, Recording
 from facesynth.corpus.signals import PARTS, Part, hash_file, hash_signals, lost_parts, read_speech
@@ -29,10 +30,6 @@ from facesynth.speech.textgrid import read_textgrid, write_textgrid
 if TYPE_CHECKING:
     from facesynth.speech.hearing import Heard
 
-LONGEST_DIFFERENCE_S = 0.1
-"""Sound and motion of one recording may differ so much in length without a word."""
-MOST_MISSING = 0.5
-"""Share of a motion's samples that may be missing, and of a sound without motion."""
 BETWEEN = "|"
 """Between the remarks on the motion and those on the speech."""
 FAULT = "a fault of facesynth"
@@ -93,6 +90,11 @@ def attempt(task: Task) -> Prepared | FacesynthError | None:
 
 def prepare(corpus: Corpus, given: Given, replacing: bool = False) -> Prepared | None:
     """Read, capture and align what the corpus lacks of a recording, writing nothing; None where it lacks nothing."""
+    with unpacked(corpus, given.recording) as recording:
+        return _prepared(corpus, with_unpacked(corpus, given, recording), replacing)
+
+
+def _prepared(corpus: Corpus, given: Given, replacing: bool) -> Prepared | None:
     if given.id not in corpus:
         return _new(corpus, given)
     old = corpus.record(given.id)
@@ -264,7 +266,7 @@ def _require_emotion(corpus: Corpus, record: Record, recording: Recording) -> No
 def read_motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Motion, tuple[str, ...]]:
     """The motion of a recording in its corpus' layout and at its rate, and what was noticed."""
     if recording.motion.suffix.lower() not in VIDEO:
-        return load_motion(recording.motion, corpus.layout, corpus.fps)
+        return read_into(corpus, recording.motion)
     if is_tracked(corpus.layout):
         from facesynth.corpus.importers.points import motion_from_points
 

@@ -7,13 +7,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from facesynth.corpus.importers.livelink import is_live_link
 from facesynth.corpus.transcripts import is_table
 from facesynth.errors import FacesynthError
 from facesynth.speech.textgrid import is_silence_mark
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
 VIDEO = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg"})
-MOTION = frozenset({".npz", ".csv"})
+MOTION = frozenset({".npz", ".csv", ".c3d", ".mat"})
+OWN_SOUND = frozenset({".c3d", ".mat"})
+"""Motion files that may hold the sound as well."""
 PHONES = frozenset({".textgrid", ".lab", ".phn"})
 WORDS = frozenset({".align", ".wrd"})
 """Lines of `start end word`, as GRID and TIMIT come with; the times are not used."""
@@ -37,6 +40,7 @@ class Recording:
     name: str
     """The name that they share, without suffix."""
     sound: Path
+    """That of the motion, where the sound lies in it or there is none."""
     motion: Path
     """A motion file, or the video of which the face is captured."""
     phones: Path | None = None
@@ -64,7 +68,7 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
     groups = _married(groups)
     recordings = []
     for name, found in sorted(groups.items()):
-        group = _with_video(found)
+        group = _with_own_sound(_with_video(found))
         fault = _fault(group)
         if fault:
             refused[name] = fault
@@ -119,6 +123,15 @@ def _with_video(group: dict[str, list[Path]]) -> dict[str, list[Path]]:
         return group
     sounds = [file for file in group["sound"] if file not in videos]
     return {**group, "sound": sounds or videos, "motion": videos}
+
+
+def _with_own_sound(group: dict[str, list[Path]]) -> dict[str, list[Path]]:
+    """What holds the sound as well as the motion, or is of use without, stands for both where no sound lies beside it."""
+    motions = group.get("motion", [])
+    if "sound" in group or len(motions) != 1:
+        return group
+    suffix = motions[0].suffix.lower()
+    return {**group, "sound": motions} if suffix in OWN_SOUND or (suffix == ".csv" and is_live_link(motions[0])) else group
 
 
 def _fault(group: Mapping[str, list[Path]]) -> str:

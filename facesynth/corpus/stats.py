@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from facesynth.corpus.corpus import Corpus
+from facesynth.corpus.eyes import EyeStats, eye_stats
 from facesynth.corpus.utterance import Utterance
 from facesynth.progress import track
 from facesynth.speech.phones import PHONES, SILENCE
@@ -48,6 +49,8 @@ class CorpusStats:
     missing_samples: int
     """Samples in gaps that stay open."""
     long_gaps: int
+    eyes: EyeStats | None = None
+    """Blinks and gaze, where recordings show them; those without sound too."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -69,6 +72,7 @@ class CorpusStats:
             f"diphones          {self.diphones} different, {self.diphones_per_minute:.0f} per minute",
             f"missing samples   {self.filled_samples} filled ({self.filled_samples * share:.2f} %),"
             f" {self.missing_samples} open ({self.missing_samples * share:.2f} %) in {self.long_gaps} long gaps",
+            *([self.eyes.text()] if self.eyes else []),
         ]
         return "\n".join(lines)
 
@@ -111,6 +115,7 @@ def stats(corpus: Corpus) -> CorpusStats:
         filled_samples=filled,
         missing_samples=missing,
         long_gaps=gaps,
+        eyes=eye_stats(corpus),
     )
 
 

@@ -88,16 +88,26 @@ class Layout:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:
-        """The inverse of `to_dict`."""
+        """The inverse of `to_dict`; points of groups and lip pairs may be given by number or by name."""
         extra = set(plain) - {"kind", "names", "groups", "lip_pairs", "neutral"}
         if extra:
             raise unknown("layout field", sorted(extra)[0], ("kind", "names", "groups", "lip_pairs", "neutral"))
-        pairs = tuple((int(a), int(b)) for a, b in plain.get("lip_pairs") or ())
+        names = tuple(map(str, plain["names"]))
+        pairs = tuple((_number(a, names), _number(b, names)) for a, b in plain.get("lip_pairs") or ())
         neutral = plain.get("neutral")
         return cls(
             plain["kind"],
-            tuple(map(str, plain["names"])),
-            {str(k): tuple(map(int, v)) for k, v in (plain.get("groups") or {}).items()},
+            names,
+            {str(k): tuple(_number(point, names) for point in v) for k, v in (plain.get("groups") or {}).items()},
             pairs,
             None if neutral is None else tuple(map(float, neutral)),
         )
+
+
+def _number(point: Any, names: tuple[str, ...]) -> int:
+    """The number of a point that is given by number or by name."""
+    if not isinstance(point, str):
+        return int(point)
+    if point not in names:
+        raise unknown("point of a group", point, names)
+    return names.index(point)

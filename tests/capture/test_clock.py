@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from corpora import tiny_layout
 
-from facesynth.capture.clock import Clock, clock_between, on_clock
+from facesynth.capture.clock import Clock, Recorder, clock_between, on_clock
 from facesynth.errors import FacesynthError
 from facesynth.motion.motion import Motion
 
@@ -46,6 +46,28 @@ def test_a_short_clip_has_an_offset_and_no_drift():
     clock = clock_between(recorded(loudness, 3), RATE, recorded(loudness, 4, 0.25, seed=3), RATE)
     assert clock.offset_s == pytest.approx(0.25, abs=0.003)
     assert clock.drift == 0
+    assert not clock.drift_known
+    assert "too short to tell" in str(clock)
+
+
+def test_fifteen_seconds_are_too_short_to_tell_a_drift():
+    loudness = syllables(15)
+    clock = clock_between(recorded(loudness, 15), RATE, recorded(loudness, 15, 0.1, drift=3e-4, seed=5), RATE)
+    assert clock.offset_s == pytest.approx(0.1, abs=0.006)
+    assert "drift +0 ppm" not in str(clock)
+    assert "drift +300 ppm" in str(Clock(0.1, 3e-4, 0.9))
+
+
+def test_the_place_of_each_clip_in_one_long_recording_is_found():
+    loudness = syllables(90)
+    recorder = Recorder.of(recorded(loudness, 90, noise=0.01, rate=44100), 44100)
+    for start_s in (0.0, 31.7, 82.0):
+        clip = recorded(lambda times, start_s=start_s: loudness(times + start_s), 6, noise=0.01, seed=3)
+        part = recorder.part_of(clip, RATE)
+        assert len(part) / 44100 == pytest.approx(6, abs=0.01)
+        assert clock_between(clip, RATE, part, 44100).offset_s == pytest.approx(0, abs=0.004)
+    with pytest.raises(FacesynthError, match="nowhere in the recorder's"):
+        recorder.part_of(recorded(syllables(6, seed=8), 6, seed=9), RATE)
 
 
 def test_another_takes_sound_is_refused():

@@ -55,6 +55,24 @@ def test_a_recording_is_never_written_over(tmp_path):
         plan_targets([video], [tmp_path / "{nme}.csv"], [])
 
 
+def test_what_is_read_is_never_written_over(tmp_path, model, monkeypatch, capsys):
+    recorded(tmp_path, model, "a")
+    (tmp_path / "mask.glb").write_bytes(b"a head")
+    (tmp_path / "e.csv").write_text("time_s,emotion\n")
+    (tmp_path / "actor").mkdir()
+    (tmp_path / "actor" / "corpus.yaml").write_text("format: 1\n")
+    (tmp_path / "actor" / "motion").mkdir()
+    (tmp_path / "actor" / "motion" / "a.npz").write_bytes(b"motion")
+    read = {"mask.glb": ["--rig", tmp_path / "mask.glb"], "e.csv": ["--emotions", tmp_path / "e.csv"], "actor/motion/a.npz": []}
+    for name, options in read.items():
+        before = (tmp_path / name).read_bytes()
+        assert code(monkeypatch, "speak", model[0], tmp_path / "a.wav", *options, "-o", tmp_path / name) == 2
+        assert "write to another file" in capsys.readouterr().err
+        assert (tmp_path / name).read_bytes() == before
+    with pytest.raises(FacesynthError, match="is read"):
+        plan_targets([tmp_path / "a.wav"], [tmp_path / "x" / ".." / "mask.glb"], [], [tmp_path / "mask.glb"])
+
+
 def test_results_among_the_recordings_of_a_folder_are_no_recordings(tmp_path):
     recordings = [tmp_path / "a.mp4", tmp_path / "a.wav", tmp_path / "b.wav"]
     plan = plan_targets(recordings, [tmp_path / "{name}.mp4"], [tmp_path])

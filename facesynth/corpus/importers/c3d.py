@@ -10,47 +10,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.importers.description import UNITS_MM, Written
 from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, require_file
 from facesynth.errors import FacesynthError, unknown
 from facesynth.motion.layout import Layout
 
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "inch": 25.4, "ft": 304.8}
 SOUNDS = ("audio", "sound", "mic", "voice", "speech")
 """What analog channels that hold sound are called."""
 LOWEST_SOUND_HZ = 4000
-AXES = "xyz"
 
 
-def read_c3d(path: Path, layout: Layout | None = None, axes: str = "x,y,z") -> Reading:
+def read_c3d(path: Path, layout: Layout | None = None, written: Written | None = None) -> Reading:
     """Markers in mm; gaps are NaN. A layout picks its markers by name, else all that have a name are taken.
 
-    axes: which of the file's axes run to the performer's left, up, and out of the face, such as `x,z,-y`.
+    written: unit, where the file states none or a wrong one, and which of its axes run to the performer's left, up, and
+    out of the face.
     """
     require_file(path)
     content = _opened(path)
-    labels = content.labels
+    labels = _without_subject(content.labels)
+    written = written or Written()
     unit = content.unit.lower() or "mm"
-    if unit not in UNITS_MM:
-        raise FacesynthError(f"{path} is in {content.unit!r}; known units are {', '.join(UNITS_MM)}")
-    placed = turned(content.points * UNITS_MM[unit], axes)
-    chosen = layout or _layout(path, labels, placed)
-    for name in chosen.names:
+    if not written.unit and unit not in UNITS_MM:
+        raise FacesynthError(
+            f"{path} is in {content.unit!r}; known units are {', '.join(UNITS_MM)}; say the right one in a layout file:"
+            " `files: {unit: …}`"
+        )
+    placed = written.placed(content.points, unit)
+    names = _named(path, labels) if layout is None else layout.names
+    for name in names:
         if name not in labels:
             raise FacesynthError(f"{path}: {unknown('marker', name, labels)}")
-    frames = placed[:, [labels.index(name) for name in chosen.names]].reshape(len(placed), -1)
-    others = len(labels) - len(chosen.names)
+    frames = placed[:, [labels.index(name) for name in names]].reshape(len(placed), -1)
+    others = len(labels) - len(names)
     remarks = (f"{others} markers without a name in the layout were left out",) if others else ()
-    return Reading(motion_of_arrays(path, frames, content.fps, chosen), _sound(content), remarks=remarks)
+    motion = motion_of_arrays(path, frames, content.fps, layout or Layout("markers", names))
+    return Reading(motion, _sound(content), remarks=remarks)
 
 
-def turned(points: NDArray[np.float64], axes: str) -> NDArray[np.float64]:
-    """Points [T, K, 3] with other axes, said as three signed letters."""
-    parts = [part.strip().lower() for part in axes.split(",")]
-    letters = [part.lstrip("+-") for part in parts]
-    if sorted(letters) != list(AXES):
-        raise FacesynthError(f"axes are three different signed letters such as x,z,-y; got {axes!r}")
-    signs = [-1.0 if part.startswith("-") else 1.0 for part in parts]
-    return points[..., [AXES.index(letter) for letter in letters]] * signs
+def _without_subject(labels: list[str]) -> list[str]:
+    """Names without the subject's (`Ada:chin`), where all that a person gave have the same."""
+    subjects = {label.rpartition(":")[0] for label in labels if label and not label.startswith("*")}
+    return [label.rpartition(":")[2] for label in labels] if len(subjects) == 1 else labels
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,8 @@ def _content(reader: Any) -> _Content:
     count = int(reader.point_used)
     frames, analog = [], []
     for _, points, channels in reader.read_frames():
-        frames.append(np.where(points[:, 3:4] < 0, np.nan, points[:, :3]))
+        unseen = (points[:, 3:4] < 0) | ~points[:, :3].any(axis=1, keepdims=True)  # some programs write 0, 0, 0 for a gap
+        frames.append(np.where(unseen, np.nan, points[:, :3].astype(np.float64)))
         analog.append(channels)
     unit = reader.get("POINT:UNITS")
     return _Content(
@@ -117,15 +119,12 @@ def _labels(reader: Any, count: int) -> list[str]:
     return [*labels[:count], *(f"*{number}" for number in range(len(labels), count))]
 
 
-def _layout(path: Path, labels: list[str], points: NDArray[np.float64]) -> Layout:
-    """Every marker that a person named; the middle of what was seen is taken as its rest."""
+def _named(path: Path, labels: list[str]) -> tuple[str, ...]:
+    """Every marker that a person named."""
     named = [name for name in labels if name and not name.startswith("*")]
     if not named or len(set(named)) != len(named):
         raise FacesynthError(f"{path} names {len(set(named))} different markers of {len(named)}; name each of them once")
-    seen = points[:, [labels.index(name) for name in named]]
-    if np.isnan(seen).all(axis=(0, 2)).any():
-        return Layout("markers", tuple(named))
-    return Layout("markers", tuple(named), neutral=tuple(np.nanmedian(seen, axis=0).ravel().tolist()))
+    return tuple(named)
 
 
 def _sound(content: _Content) -> Sound | None:

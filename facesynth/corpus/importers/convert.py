@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from facesynth.atomic import atomic_path, write_text
-from facesynth.corpus.importers.articulography import is_articulography, read_articulography
-from facesynth.corpus.importers.c3d import read_c3d
-from facesynth.corpus.importers.flame import is_flame, read_flame
-from facesynth.corpus.importers.livelink import is_livelink, read_livelink_motion
-from facesynth.corpus.importers.reading import Reading, require_file
-from facesynth.corpus.importers.tables import load_mat, read_arrays, read_table
+from facesynth.corpus.importers.description import LAYOUT, Description, description_text
+from facesynth.corpus.importers.formats import SUFFIXES, read
+from facesynth.corpus.importers.reading import Reading
+from facesynth.corpus.importers.session import Session, survey
+from facesynth.corpus.motion_files import with_points_of
+from facesynth.corpus.recordings import AUDIO, VIDEO, Recording, find_recordings
 from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
 from facesynth.progress import track
-from facesynth.speech.audio import save_wav
+from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_textgrid
-
-SUFFIXES = frozenset({".c3d", ".csv", ".npz", ".mat"})
-LAYOUT = "layout.yaml"
 
 
 @dataclass(frozen=True)
@@ -34,59 +31,87 @@ class ConvertReport:
     refused: Mapping[str, str] = field(default_factory=dict)
     remarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     fps: float = 0.0
-    """Rate of the first recording, Hz."""
+    """Rate of most recordings, Hz."""
+    guessed: tuple[str, ...] = ()
+    """What nobody said of the markers."""
 
 
 def convert(
-    paths: Iterable[str | Path],
-    folder: str | Path,
-    *,
-    layout: Layout | None = None,
-    fps: float | None = None,
-    axes: str = "x,y,z",
+    paths: Iterable[str | Path], folder: str | Path, *, description: Description | None = None, fps: float | None = None
 ) -> ConvertReport:
-    """Read every C3D, CSV, NPZ and MAT of files and folders; write motion, sound, phones and words as far as they hold them.
+    """Read every C3D, CSV, NPZ and MAT of files and folders; write motion, sound, phones and words in or beside them.
 
-    The layout of the first recording is written beside them as `layout.yaml`; recordings of another one are refused,
-    as is what cannot be read, each with the reason; the others are converted.
+    The layout that most recordings share is written beside them as `layout.yaml`, with the rest pose of all; those that
+    lack channels of it are refused, as is what cannot be read, each with the reason; the others are converted.
     """
-    folder = Path(folder)
+    folder, paths = Path(folder), list(paths)
+    files = _files(paths)
     converted: list[str] = []
     refused: dict[str, str] = {}
     remarks: dict[str, tuple[str, ...]] = {}
-    first: Reading | None = None
-    for path in track(_files(paths), "converting"):
+    session = _survey(files, description, fps)
+    beside = {found.motion.resolve(): found for found in _recordings(paths)}
+    for path in track(files, "converting"):
         try:
-            reading = read(path, layout, fps, axes)
-            _require_same(first, reading, path)
+            if session is None:
+                session = survey([path], description, fps)
+            said = _convert(folder, path, session, description, fps, beside.get(path.resolve()))
         except FacesynthError as error:
             refused[path.name] = str(error)
             continue
-        first = first or reading
-        _write(folder, path.stem, reading)
         converted.append(path.stem)
-        remarks |= {path.stem: reading.remarks} if reading.remarks else {}
-    if first is not None:
-        write_text(folder / LAYOUT, _yaml(first.motion.layout))
-    return ConvertReport(tuple(converted), refused, remarks, 0.0 if first is None else first.motion.fps)
+        remarks |= {path.stem: said} if said else {}
+    if session is None or not converted:
+        return ConvertReport((), refused, remarks)
+    write_text(folder / LAYOUT, description_text(Description(session.layout)))
+    return ConvertReport(tuple(converted), refused, remarks, session.fps, session.remarks)
 
 
-def read(path: str | Path, layout: Layout | None = None, fps: float | None = None, axes: str = "x,y,z") -> Reading:
-    """One recording of any known system; a FacesynthError says why a file is none."""
-    path = Path(path)
-    require_file(path)
-    suffix = path.suffix.lower()
-    if suffix == ".c3d":
-        return read_c3d(path, layout, axes)
-    if suffix == ".csv" and is_livelink(path):
-        return read_livelink_motion(path)
-    if suffix == ".npz" and is_flame(arrays := read_arrays(path)):
-        return read_flame(path, arrays)
-    if suffix == ".mat" and is_articulography(load_mat(path)):
-        return read_articulography(path)
-    if suffix not in SUFFIXES:
-        raise FacesynthError(f"{path} is none of {', '.join(sorted(SUFFIXES))}")
-    return read_table(path, layout, fps)
+def _survey(files: list[Path], description: Description | None, fps: float | None) -> Session | None:
+    """What the files have in common; None where none can be read."""
+    try:
+        return survey(files, description, fps)
+    except FacesynthError:
+        return None
+
+
+def _recordings(paths: Iterable[str | Path]) -> list[Recording]:
+    try:
+        return find_recordings(paths)[0]
+    except FacesynthError:
+        return []
+
+
+def _convert(
+    folder: Path, path: Path, session: Session, description: Description | None, fps: float | None, beside: Recording | None
+) -> tuple[str, ...]:
+    reading = read(path, description.layout if description else None, fps, session.written)
+    try:
+        motion, remarks = with_points_of(session.layout, reading.motion)
+    except FacesynthError as error:
+        raise FacesynthError(f"{path} has other channels than most recordings: {error}") from None
+    _write(folder, path.stem, replace(reading, motion=motion))
+    if beside is not None:
+        _carry(folder, path.stem, beside)
+    return (*reading.remarks, *remarks)
+
+
+def _carry(folder: Path, name: str, beside: Recording) -> None:
+    """Bring along what lies beside a recording: its sound, unless it is in the motion's file; phones, words, emotions."""
+    if beside.sound != beside.motion:
+        if beside.sound.suffix.lower() in VIDEO:
+            save_wav(folder / f"{name}.wav", *load_audio(beside.sound))
+        elif beside.sound.suffix.lower() in AUDIO:
+            _copy(beside.sound, folder / f"{name}{beside.sound.suffix}")
+    for path, suffix in ((beside.phones, ""), (beside.text, ""), (beside.emotions, ".emotions.csv")):
+        if path is not None:
+            _copy(path, folder / f"{name}{suffix or path.suffix}")
+
+
+def _copy(source: Path, target: Path) -> None:
+    if source.resolve() != target.resolve():
+        with atomic_path(target) as part:
+            shutil.copyfile(source, part)
 
 
 def _files(paths: Iterable[str | Path]) -> list[Path]:
@@ -94,20 +119,9 @@ def _files(paths: Iterable[str | Path]) -> list[Path]:
     for path in map(Path, paths):
         if path.is_dir():
             found += sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith("."))
-        else:
+        elif path.suffix.lower() in SUFFIXES or not path.is_file():
             found.append(path)
     return found
-
-
-def _require_same(first: Reading | None, reading: Reading, path: Path) -> None:
-    if first is None:
-        return
-    kept, own = first.motion.layout, reading.motion.layout
-    if (kept.kind, kept.names) != (own.kind, own.names):
-        odd = sorted(set(kept.names) ^ set(own.names))[:3]
-        raise FacesynthError(
-            f"{path} has other channels than the first recording ({', '.join(odd)}); give a layout file for both"
-        )
 
 
 def _write(folder: Path, name: str, reading: Reading) -> None:
@@ -122,9 +136,3 @@ def _write(folder: Path, name: str, reading: Reading) -> None:
         write_textgrid(folder / f"{name}.TextGrid", reading.phones, reading.words)
     if reading.text:
         write_text(folder / f"{name}.txt", reading.text + "\n")
-
-
-def _yaml(layout: Layout) -> str:
-    import yaml
-
-    return str(yaml.safe_dump(layout.to_dict(), sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))

@@ -15,28 +15,33 @@ from facesynth.errors import FacesynthError
 from facesynth.motion.layout import Layout
 
 FIRST = ("Timecode", "BlendshapeCount")
+LIVE_LINK = b"Timecode,BlendshapeCount,"
+"""How a take of the app begins."""
 ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
+EYE_ANGLES = ANGLES[3:]
+"""Kept as curves of their own (`leftEyeYaw`, …; rad): a motion has one gaze, a take two, and their rolls."""
 _TIMECODE = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d):(\d{2,3})(?:\.(\d+))?")
 _RATES = (24.0, 25.0, 30.0, 50.0, 60.0, 120.0)
 
 
-def is_livelink(path: Path) -> bool:
-    """Whether a CSV begins as the app's do."""
+def is_live_link(path: Path) -> bool:
+    """Whether a CSV begins as those of the Live Link Face app do."""
     with open(path, "rb") as file:
-        return file.read(64).lstrip(b"\xef\xbb\xbf").startswith(b"Timecode,BlendshapeCount,")
+        return file.read(64).removeprefix(b"\xef\xbb\xbf").startswith(LIVE_LINK)
 
 
 def read_livelink_motion(path: Path) -> Reading:
     """A take as curves with head and eyes; there is no sound in it.
 
+    The gaze is the mean of both eyes; the angles of each stay, as six curves.
     Yaw is positive to the performer's right and pitch down, as the eyes' angles and looks in the app's own takes show.
     """
     require_file(path)
     names, timecodes, values = _table(path)
-    curves = [column for column in names if column not in ANGLES]
-    frames = np.clip(values[:, [names.index(column) for column in curves]], 0, 1)
-    layout = Layout("curves", tuple(column[0].lower() + column[1:] for column in curves))
+    weights = [column for column in names if column not in ANGLES]
+    frames = np.clip(values[:, [names.index(column) for column in weights]], 0, 1)
     angles = values[:, [names.index(angle) for angle in ANGLES]].reshape(-1, 3, 3)
+    layout = Layout("curves", tuple(column[0].lower() + column[1:] for column in (*weights, *EYE_ANGLES)))
     head = np.concatenate(
         [Rotation.from_euler("YXZ", angles[:, 0] * [-1, 1, -1]).as_rotvec(), np.zeros((len(values), 3))], axis=1
     )
@@ -44,7 +49,8 @@ def read_livelink_motion(path: Path) -> Reading:
     opening = 1 - frames[:, shut].mean(axis=1) if shut else np.ones(len(frames))
     eyes = np.column_stack([opening, -angles[:, 1:, :2].mean(axis=1)])
     still = () if np.any(angles[:, 0]) else ("the head angles are all zero: the app was told not to stream them",)
-    return Reading(motion_of_arrays(path, frames, _rate(path, timecodes), layout, head, eyes), remarks=still)
+    frames = np.concatenate([frames, angles[:, 1:].reshape(len(frames), -1)], axis=1)
+    return Reading(motion_of_arrays(path, frames, _rate(path, timecodes), layout, head, eyes), remarks=still, silent=True)
 
 
 def _table(path: Path) -> tuple[list[str], list[str], NDArray[np.float64]]:

@@ -39,6 +39,8 @@ class Reading:
     words: tuple[Segment, ...] = ()
     text: str = ""
     remarks: tuple[str, ...] = field(default=())
+    silent: bool = False
+    """Whether it is of use without sound: it shows eyes and blinks."""
 
 
 def require_file(path: Path) -> None:

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-import csv
+import re
 import zipfile
+from collections.abc import Mapping
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.cells import is_number, read_names
+from facesynth.corpus.importers.description import ORDER, Written
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
-from facesynth.corpus.motion_files import TIME, load_motion, own_rate
+from facesynth.corpus.motion_files import read_csv, shortened, time_column
 from facesynth.corpus.npz import require_modest
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.errors import FacesynthError, unknown
+from facesynth.motion.layout import Kind, Layout
 
 CHANNELS = "channels.txt"
 """Beside weights: the names of the columns, one a line."""
-FRAMES = ("frames", "weights", "points", "data", "signal")
-POINTS = (".x", ".y", ".z")
-"""How the columns of points end: those need a layout."""
-RATES = ("fps", "rate", "srate", "framerate")
+FRAMES = ("frames", "weights", "points", "positions", "position", "pos", "markers", "trajectories", "xyz", "data", "signal")
+RATES = ("fps", "rate", "srate", "framerate", "samplerate", "samplingrate", "fs", "sr", "hz", "freq", "frequency")
+"""Usual names of variables, in lower case and without anything but letters."""
+_OF_A_POINT = re.compile(r"(.+)[ ._:-]([xyzXYZ])")
+DEEPEST = 3
+"""Structs within structs."""
 
 
 def read_channels(path: Path) -> Layout:
@@ -33,62 +39,128 @@ def read_channels(path: Path) -> Layout:
     return Layout("curves", tuple(names))
 
 
-def read_table(path: Path, layout: Layout | None, fps: float | None) -> Reading:
-    """Motion [T, C] or [T, K, dimension] under any usual name in a CSV, NPZ or MAT.
+def read_table(
+    path: Path, layout: Layout | None, fps: float | None, written: Written | None = None, *, otherwise: Layout | None = None
+) -> Reading:
+    """Motion [T, C] or [T, K, dimension] under any usual name in a CSV, NPZ or MAT, or under the one that `written` says.
 
-    The layout is the given one, else that of `channels.txt` in the same folder, else curves as the file
-    names them; the rate is the file's own, else `fps`.
+    The layout is the given one, else that of `channels.txt` in the same folder, else what the file names itself, else
+    `otherwise`; the rate is the file's own, else the one that `written` says, else `fps`.
     """
     require_file(path)
-    if layout is None:
-        beside = path.with_name(CHANNELS)
-        layout = read_channels(beside) if beside.is_file() else _self_named(path)
+    written = written or Written()
+    beside = path.with_name(CHANNELS)
+    if layout is None and beside.is_file():
+        layout = read_channels(beside)
+    if is_number(written.rate):
+        fps = float(written.rate)
     if path.suffix.lower() == ".csv":
-        timed = TIME in _columns(path)
-        if fps is None and not timed:
-            raise FacesynthError(f"{path} does not state its rate: give it, or a column {TIME}")
-        motion, remarks = load_motion(path, layout, fps or own_rate(path))
+        layout = layout or otherwise or _named_columns(path, written)
+        motion, remarks = read_csv(path, layout, fps or 1.0, written, only_own_rate=fps is None)
+        motion_of_arrays(path, motion.frames, motion.fps, layout)
         return Reading(motion, remarks=remarks)
     arrays = _npz(path) if path.suffix.lower() == ".npz" else _mat(path)
-    frames = _named(arrays, FRAMES)
-    rate = _named(arrays, RATES)
-    known = float(rate.ravel()[0]) if rate is not None and rate.size == 1 else fps
-    if frames is None or known is None:
-        lacking = f"none of {', '.join(FRAMES)}" if frames is None else "no rate (fps)"
+    array, frames = _motion_array(path, arrays, written)
+    layout = layout or _named_array(path, frames, otherwise)
+    frames, remarks = _in_order(path, frames, layout, written)
+    if layout.dimension > 1 and frames.shape[1:] == (layout.channels,):
+        frames = written.placed(layout.points(frames)).reshape(len(frames), -1)
+    head, eyes = (_named(arrays, (name,)) if array.lower() != name else None for name in ("head", "eyes"))
+    motion = motion_of_arrays(path, frames, _rate(path, arrays, written, fps), layout, head, eyes)
+    return Reading(motion, remarks=remarks)
+
+
+def _motion_array(path: Path, arrays: Mapping[str, NDArray[Any]], written: Written) -> tuple[str, NDArray[Any]]:
+    """Name and values of the array that holds the motion."""
+    if written.array:
+        if written.array not in arrays:
+            raise FacesynthError(f"{path}: {unknown('array', written.array, arrays)}")
+        return written.array, arrays[written.array]
+    usual = {_letters(name): name for name in reversed(list(arrays))}
+    found = next((usual[name] for name in FRAMES if name in usual), None)
+    large = [name for name, value in arrays.items() if value.ndim in (2, 3) and value.size > 3 and min(value.shape) > 1]
+    found = found or (large[0] if len(large) == 1 else None)
+    if found is None:
         raise FacesynthError(
-            f"{path} holds {', '.join(arrays) or 'nothing'}, but {lacking}; name the arrays so, or give the rate"
+            f"{path} holds {shortened(list(arrays)) or 'nothing'}, but none of {', '.join(FRAMES)}; name the array in the layout"
+            " file: `files: {array: NAME}`"
         )
-    if frames.ndim == 3 and frames.shape[1:] == (len(layout.names), layout.dimension):
-        frames = frames.reshape(len(frames), -1)
-    return Reading(motion_of_arrays(path, frames, known, layout, _named(arrays, ("head",)), _named(arrays, ("eyes",))))
+    return found, arrays[found]
 
 
-def _self_named(path: Path) -> Layout:
-    """Curves whose names are the columns of a CSV, or the array `names` of an NPZ; FacesynthError where there are none."""
-    names: list[str] = []
-    if path.suffix.lower() == ".csv":
-        names = [column for column in _columns(path) if column != TIME]
-    elif path.suffix.lower() == ".npz":
-        names = [str(name) for name in np.ravel(_npz(path, "fiuU").get("names", []))]
-    if not names or len(set(names)) != len(names) or any(_is_number(name) or name.endswith(POINTS) for name in names):
+def _rate(path: Path, arrays: Mapping[str, NDArray[Any]], written: Written, fps: float | None) -> float:
+    if written.rate and not is_number(written.rate):
+        if written.rate not in arrays or arrays[written.rate].size != 1:
+            raise FacesynthError(f"{path}: {unknown('number for the rate', written.rate, arrays)}")
+        return float(arrays[written.rate].ravel()[0])
+    usual = {_letters(name): value for name, value in arrays.items() if value.size == 1}
+    stated = next((float(usual[name].ravel()[0]) for name in RATES if name in usual), None)
+    known = stated if stated is not None else fps
+    if known is None:
+        raise FacesynthError(
+            f"{path} holds {shortened(list(arrays))}, but no rate (fps); give it (--fps), or name it in the layout file:"
+            " `files: {rate: NAME}`"
+        )
+    return known
+
+
+def _in_order(path: Path, frames: NDArray[Any], layout: Layout, written: Written) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """An array of any order of dimensions as [T, C], and what was done to it; what fits in no way stays, to be refused."""
+    count, dimension = len(layout.names), layout.dimension
+    if written.dimensions:
+        if len(written.dimensions) != frames.ndim:
+            raise FacesynthError(f"{path}: order names {len(written.dimensions)} dimensions, the array has {frames.ndim}")
+        places = [written.dimensions.index(name) for name in ORDER if name in written.dimensions]
+        ordered = frames.transpose(places)
+        return ordered.reshape(len(ordered), -1), ()
+    if frames.ndim == 3:
+        fitting = [turn for turn in permutations(range(3)) if frames.transpose(turn).shape[1:] == (count, dimension)]
+        if (0, 1, 2) not in fitting and len(fitting) == 1:
+            names = ", ".join(ORDER[fitting[0].index(place)] for place in range(3))
+            return frames.transpose(fitting[0]).reshape(-1, count * dimension), (f"the array's dimensions were taken as {names}",)
+        if (0, 1, 2) in fitting:
+            return frames.reshape(len(frames), -1), ()
+    if frames.ndim == 2 and frames.shape[0] == layout.channels != frames.shape[1]:
+        return frames.T, ("the array's dimensions were taken as channels, time",)
+    return frames, ()
+
+
+def _named_columns(path: Path, written: Written) -> Layout:
+    """Curves, or points whose columns end in .x, .y and .z, as the first line of a CSV names them."""
+    names = read_names(path, written.separator, written.decimal)
+    time = time_column(names, written)
+    return _layout_of(path, [name for name in names if name != time])
+
+
+def _named_array(path: Path, frames: NDArray[Any], otherwise: Layout | None) -> Layout:
+    """What the array `names` of an NPZ names: points where the motion is [T, K, 3] or [T, K, 2], else curves."""
+    names = [str(name) for name in np.ravel(_npz(path, "U").get("names", []))] if path.suffix.lower() == ".npz" else []
+    if otherwise is not None and not names:
+        return otherwise
+    if frames.ndim == 3 and names and len(set(names)) == len(names) == frames.shape[1] and frames.shape[2] in (2, 3):
+        return Layout("markers" if frames.shape[2] == 3 else "landmarks", tuple(names))
+    return _layout_of(path, names)
+
+
+def _layout_of(path: Path, names: list[str]) -> Layout:
+    """Points where columns end in their axes (`chin.x`, `Chin Y`, …), else curves."""
+    axes: dict[str, str] = {}
+    for name in names:
+        if (found := _OF_A_POINT.fullmatch(name)) is not None:
+            axes[found[1]] = axes.get(found[1], "") + found[2].lower()
+    kinds: tuple[tuple[Kind, str], ...] = (("markers", "xyz"), ("landmarks", "xy"))
+    for kind, wanted in kinds:
+        whole = all("".join(sorted(own)) == wanted for own in axes.values())
+        if axes and whole and 2 * len(axes) * len(wanted) >= len(names):
+            return Layout(kind, tuple(axes))
+    dotted = any(name[-2:].lower() in (".x", ".y", ".z") for name in names)
+    if not names or dotted or len(set(names)) != len(names) or any(map(is_number, names)):
         raise FacesynthError(f"{path} does not name its channels; give a layout file, or write {CHANNELS} beside it")
     return Layout("curves", tuple(names))
 
 
-def _columns(path: Path) -> list[str]:
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            return [cell.strip() for cell in next(csv.reader(file), [])]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error}); export it again") from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _letters(name: str) -> str:
+    return "".join(letter for letter in name.rpartition(".")[2].lower() if letter.isalpha())
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -113,8 +185,19 @@ def _npz(path: Path, kinds: str = "fiu") -> dict[str, NDArray[Any]]:
 
 
 def _mat(path: Path) -> dict[str, NDArray[Any]]:
-    found = load_mat(path)
-    return {name: value for name, value in found.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
+    return _numbers(load_mat(path))
+
+
+def _numbers(found: Mapping[str, Any], prefix: str = "") -> dict[str, NDArray[Any]]:
+    """Arrays of numbers, those in single structs under `struct.field`."""
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, value in found.items():
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
+            arrays[prefix + name] = value
+        elif isinstance(value, np.ndarray) and value.dtype.names and value.size == 1 and prefix.count(".") < DEEPEST:
+            fields = {field: value.ravel()[0][field] for field in value.dtype.names}
+            arrays |= _numbers(fields, f"{prefix}{name}.")
+    return arrays
 
 
 def load_mat(path: Path) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def motion_from_video(
     if sound != video:
         clock = clock_between(*load_audio(video), *load_audio(sound))
         motion = on_clock(motion, clock)
-        remarks.append(f"moved by {clock.offset_s * 1000:+.0f} ms to the separate sound, drift {clock.drift * 1e6:+.0f} ppm")
+        remarks.append(str(clock))
     if not np.isclose(track.fps, fps, rtol=1e-6):
         remarks.append(f"resampled from {track.fps:g} to {fps:g} fps")
         motion = resample(motion, fps)

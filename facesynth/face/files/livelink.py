@@ -14,10 +14,13 @@ from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, rate_of, timecode
 from facesynth.face.rig import ARKIT_NAMES
+from facesynth.motion.motion import Motion
 
 ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
 HEADER = ("Timecode", "BlendshapeCount", *(name[0].upper() + name[1:] for name in ARKIT_NAMES), *ANGLES)
 COUNT = len(HEADER) - 2
+EYE_CURVES = tuple(name[0].lower() + name[1:] for name in ANGLES[3:])
+"""What a motion calls the angles of each eye (rad, the app's signs), where it has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +43,27 @@ class LiveLinkTake:
         return FaceAnimation(ARKIT_NAMES, weights, head, gaze, np.zeros(len(weights)), self.fps)
 
 
-def take_of(animation: FaceAnimation) -> LiveLinkTake:
-    """An animation as a take that starts at midnight; translation and tongue tip have no column and are left out."""
+def take_of(animation: FaceAnimation, motion: Motion | None = None) -> LiveLinkTake:
+    """An animation as a take that starts at midnight; translation and tongue tip have no column and are left out.
+
+    motion: where it has the angles of each eye as curves of their own, those are what the eyes differ by.
+    """
     rate = nominal_rate(animation.fps)
     gaze = -animation.gaze.astype(np.float64)
-    eye = np.concatenate([gaze, np.zeros((len(gaze), 1))], axis=1)
+    eyes = np.tile(np.concatenate([gaze, np.zeros((len(gaze), 1))], axis=1), (1, 2))
+    if motion is not None and set(EYE_CURVES) <= set(motion.layout.names):
+        eyes += _apart(motion, animation.times_s)
     head = _angles(animation.head[:, :3].astype(np.float64))
-    values = np.concatenate([animation.weights_for(ARKIT_NAMES), head, eye, eye], axis=1)
+    values = np.concatenate([animation.weights_for(ARKIT_NAMES), head, eyes], axis=1)
     return LiveLinkTake(tuple(timecode(t, rate) for t in animation.times_s), values, animation.fps)
+
+
+def _apart(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[T, 6] by how much the angles of each eye differ from their common gaze, at other times."""
+    own = motion.frames[:, [motion.layout.names.index(name) for name in EYE_CURVES]].astype(np.float64)
+    both = own.reshape(-1, 2, 3)
+    both[:, :, :2] -= both[:, :, :2].mean(axis=1, keepdims=True)
+    return np.stack([np.interp(times_s, motion.times_s, column) for column in both.reshape(-1, 6).T], axis=1)
 
 
 def write_livelink(path: str | Path, take: LiveLinkTake) -> None:

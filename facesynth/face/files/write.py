@@ -24,7 +24,7 @@ def write_animation(path: str | Path, animation: FaceAnimation, rig: Rig, motion
     elif suffix == ".csv":
         from facesynth.face.files.livelink import take_of, write_livelink
 
-        write_livelink(path, take_of(animation))
+        write_livelink(path, take_of(animation, motion))
     elif suffix == ".glb":
         from facesynth.face.files.gltf import write_glb
 

@@ -1,0 +1,89 @@
+"""Tables of numbers as text: commas, semicolons or tabs, decimal points or commas, with or without names of columns."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError
+
+SEPARATORS = ",;\t"
+_COMMA_NUMBER = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
+_LONGEST_QUOTE = 60
+_LOOKED_AT = 50
+"""Rows that show how numbers are written."""
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
+
+
+def read_cells(path: Path, separator: str = "", decimal: str = "") -> tuple[list[str], NDArray[np.float64]]:
+    """Names of the columns (none where the first line holds numbers), and the numbers [T, columns]; NaN for empty cells."""
+    rows = _rows(path, separator)
+    width = len(rows[0]) if rows else 0
+    for number, row in enumerate(rows, start=1):
+        if len(row) != width:
+            raise FacesynthError(f"{path}, line {number}: {len(row)} cells, but {width} columns")
+    point = decimal or _decimal(rows)
+    named = not rows or not all(is_number(cell, point) or cell.lower() in MISSING for cell in rows[0])
+    columns, body = (rows[0] if rows else [], rows[1:]) if named else ([], rows)
+    table = np.array([[_value(path, cell, point) for cell in row] for row in body], np.float64)
+    return columns, table.reshape(len(body), width)
+
+
+def read_names(path: Path, separator: str = "", decimal: str = "") -> list[str]:
+    """Names of the columns alone; none where the first line holds numbers."""
+    rows = _rows(path, separator, most=_LOOKED_AT)
+    point = decimal or _decimal(rows)
+    return [] if not rows or all(is_number(cell, point) for cell in rows[0]) else rows[0]
+
+
+def is_number(text: str, decimal: str = ".") -> bool:
+    """Whether a cell holds a number."""
+    try:
+        float(text.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]]:
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            sign = separator or _separator(file.readline())
+            file.seek(0)
+            reader = csv.reader(file, delimiter=sign, skipinitialspace=sign == " ")
+            rows: list[list[str]] = []
+            for row in reader:
+                rows += [[cell.strip() for cell in row]] if row else []
+                if most is not None and len(rows) >= most:
+                    break
+            return rows
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error}); export it again") from None
+
+
+def _separator(line: str) -> str:
+    """The sign that occurs most; a comma may also be a decimal one, so it comes after semicolon and tab."""
+    line = line.lstrip("\ufeff")
+    return next((sign for sign in (";", "\t") if sign in line), ",")
+
+
+def _decimal(rows: Sequence[Sequence[str]]) -> str:
+    cells = [cell for row in rows[:_LOOKED_AT] for cell in row]
+    return "," if any(_COMMA_NUMBER.fullmatch(cell) for cell in cells) else "."
+
+
+def _value(path: Path, cell: str, decimal: str) -> float:
+    if cell.lower() in MISSING:
+        return np.nan
+    try:
+        return float(cell.replace(decimal, "."))
+    except ValueError:
+        shown = cell if len(cell) <= _LONGEST_QUOTE else f"{cell[:_LONGEST_QUOTE]}…"
+        raise FacesynthError(
+            f"{path}: could not convert {shown!r} to a number; wanted numbers below the names of the columns"
+        ) from None

@@ -1,0 +1,145 @@
+"""What a person says of files that do not say it themselves: what their channels are, and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.errors import FacesynthError, unknown
+from facesynth.motion.layout import Layout
+
+LAYOUT = "layout.yaml"
+"""Beside recordings, or in their corpus."""
+FILES = "files"
+"""The key of a layout file under which it says how files are written."""
+UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "inch": 25.4, "ft": 304.8}
+AXES = "xyz"
+ORDER = ("time", "points", "axes")
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "\\t": "\t"}
+
+
+@dataclass(frozen=True)
+class Written:
+    """How files are written; what is empty they say themselves, or it is as usual."""
+
+    array: str = ""
+    """Name of the variable of NPZ or MAT that holds the motion; fields of structs after dots."""
+    rate: str = ""
+    """Frames per second: a number, or the name of a variable."""
+    unit: str = ""
+    """Of points."""
+    axes: str = ""
+    """Which of the files' axes run to the performer's left, up, and out of the face, such as `x,z,-y`."""
+    order: str = ""
+    """The array's dimensions in order, such as `points,axes,time`."""
+    delimiter: str = ""
+    """Between the cells of a CSV; the name or the sign."""
+    decimal: str = ""
+    """`,` in CSV with decimal commas."""
+    time: str = ""
+    """The column of a CSV that holds seconds."""
+
+    def __post_init__(self) -> None:
+        if self.unit and self.unit.lower() not in UNITS_MM:
+            raise unknown("unit", self.unit, UNITS_MM)
+        if self.axes:
+            axis_turns(self.axes)
+        if self.order and (set(self.dimensions) - set(ORDER) or len(set(self.dimensions)) != len(self.dimensions)):
+            raise FacesynthError(f"order lists {', '.join(ORDER)} (or time and points) in the array's order; got {self.order!r}")
+        if self.decimal not in ("", ".", ","):
+            raise FacesynthError(f"decimal is . or , ; got {self.decimal!r}")
+        if len(self.separator) > 1:
+            raise FacesynthError(f"delimiter is one sign, or one of {', '.join(DELIMITERS)}; got {self.delimiter!r}")
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """`order` as a tuple."""
+        return tuple(part.strip().lower() for part in self.order.split(",")) if self.order else ()
+
+    @property
+    def separator(self) -> str:
+        """The sign between the cells of a CSV; empty where the file shows it."""
+        return DELIMITERS.get(self.delimiter.lower(), self.delimiter)
+
+    def placed(self, points: NDArray[Any], unit: str = "mm") -> NDArray[np.float64]:
+        """Points [..., 3] (or [..., 2]) in mm and with our axes."""
+        scaled = np.asarray(points, np.float64) * UNITS_MM[(self.unit or unit).lower()]
+        return turned(scaled, self.axes) if self.axes and points.shape[-1] == len(AXES) else scaled
+
+    def over(self, other: Written) -> Written:
+        """These words, and the other's where these say nothing."""
+        return replace(other, **{f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name)})
+
+
+@dataclass(frozen=True)
+class Description:
+    """What is known of files beside what they hold."""
+
+    layout: Layout | None = None
+    """None: the files name their channels."""
+    written: Written = field(default_factory=Written)
+
+
+def turned(points: NDArray[np.float64], axes: str) -> NDArray[np.float64]:
+    """Points [T, K, 3] with other axes, said as three signed letters."""
+    places, signs = axis_turns(axes)
+    return points[..., places] * signs
+
+
+def axis_turns(axes: str) -> tuple[list[int], list[float]]:
+    """Place and sign of each of our axes in a file's."""
+    parts = [part.strip().lower() for part in axes.split(",")]
+    letters = [part.lstrip("+-") for part in parts]
+    if sorted(letters) != list(AXES):
+        raise FacesynthError(f"axes are three different signed letters such as x,z,-y; got {axes!r}")
+    return [AXES.index(letter) for letter in letters], [-1.0 if part.startswith("-") else 1.0 for part in parts]
+
+
+def read_description(path: Path) -> Description:
+    """A layout file (YAML or JSON, or a corpus.yaml): kind, names, groups …, and under `files` how files are written."""
+    import yaml
+
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+        plain = dict(plain.get("layout", plain))
+        written = _written(path, plain.pop(FILES, None) or {})
+        return Description(Layout.from_dict(plain) if plain else None, written)
+    except FileNotFoundError:
+        raise FacesynthError(f"{path}: no such layout file") from None
+    except KeyError as error:
+        raise FacesynthError(f"{path}: {error} is missing; a layout needs kind and names") from None
+    except (yaml.YAMLError, OSError, TypeError, AttributeError, ValueError) as error:
+        raise FacesynthError(f"{path} is not a layout: {' '.join(str(error).split())}") from None
+
+
+def description_beside(path: Path) -> Description | None:
+    """What the `layout.yaml` in the folder of a file says, if there is one."""
+    beside = path.with_name(LAYOUT)
+    return read_description(beside) if beside.is_file() else None
+
+
+def description_text(description: Description) -> str:
+    """YAML that `read_description` reads."""
+    import yaml
+
+    plain = description.layout.to_dict() if description.layout else {}
+    said = {f.name: value for f in fields(Written) if (value := getattr(description.written, f.name))}
+    plain |= {FILES: said} if said else {}
+    return str(yaml.safe_dump(plain, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))
+
+
+def _written(path: Path, plain: Mapping[str, Any]) -> Written:
+    known = tuple(f.name for f in fields(Written))
+    for name in plain:
+        if name not in known:
+            raise unknown(f"key under {FILES} in {path}", str(name), known)
+    return Written(**{name: _text(value) for name, value in plain.items()})
+
+
+def _text(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, list) else "" if value is None else str(value)
