@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.export.expectation import expectation_graph, predictor_parts
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
-from facesynth.export.speech_graphs import rasta_plp_stream_graph
+from facesynth.export.speech_graphs import log_mel_graph, rasta_plp_stream_graph
 from facesynth.methods.anime_graph.features import RATE
 from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.speech.mel import LogMel
 
 COLUMNS = (
     "phones", "emotions", "starts", "stops", "feature_starts", "feature_stops", "run_starts", "run_stops", "before", "after",
@@ -21,9 +22,7 @@ COLUMNS = (
 
 
 def anime_graph_content(model: AnimeGraph) -> Content:
-    """Everything that the runtime needs of a trained graph; FacesynthError where its search is another one."""
-    if model.config["temperature"] > 0:
-        raise FacesynthError("the runtime takes the cheapest path; export an anime graph that was trained with temperature=0")
+    """Everything that the runtime needs of a trained graph."""
     parts, unit = model.components, model.fitted_layout.unit
     mean, mixing, analysis = parts.mean.numpy(), parts.mixing.numpy(), parts.analysis.numpy()
     tensors = {name: tensor.cpu().numpy() for name, tensor in model.nodes.named_buffers()}
@@ -39,17 +38,25 @@ def anime_graph_content(model: AnimeGraph) -> Content:
     if len(maps.pairs):
         graphs.append(emotion_maps_graph(maps, model.fps))
         arrays["dropped"] = maps.dropped.numpy()
+    more: dict[str, Any] = {}
+    if model.predictor is not None:
+        more, learned = predictor_parts(model.predictor)
+        arrays |= learned
+        graphs += [expectation_graph(model.predictor, unit), log_mel_graph(LogMel())]
     return Content(
         graphs=tuple(graphs),
         settings={
             "parameters": model.config["parameters"],
             "bands": model.audio.plp.bands.shape[1],
             "feature_fps": model.audio.fps,
-            "weights": {name: float(getattr(model.weights, name)) for name in ("jump", "jump_cost", "audio")},
+            "weights": {name: float(getattr(model.weights, name)) for name in ("jump", "jump_cost", "audio", "pose")},
             "help_pairs": model.config["help_pairs"],
             "closed_gap": model.facts["closed_gap"],
             "maps": maps.pairs.tolist(),
             "no_map": model.facts["no_map"],
+            "temperature": model.config["temperature"],
+            "sharpening": model.config["sharpening"],
+            **more,
         },
         latency={
             "look_ahead_s": None,

@@ -10,25 +10,22 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.export.expectation import expectation_graph, predictor_parts, sound_parts
 from facesynth.export.folder import Content
+from facesynth.export.graph import Graph
 from facesynth.export.motion_graphs import decode_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
+from facesynth.export.speech_graphs import log_mel_graph
 from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.nodes import Ints
+from facesynth.speech.mel import LogMel
 
-BEYOND_THE_PAPER = ("temperature", "audio_weight", "pose_weight", "sharpening")
-"""Settings with which more than the cheapest path is asked for; the runtime has no such search."""
 COLUMNS = ("starts", "stops", "phones", "visemes", "emotions", "before")
 
 
 def efase_content(model: Efase) -> Content:
-    """Everything that the runtime needs of a trained database; FacesynthError where its search is another one."""
-    used = [name for name in BEYOND_THE_PAPER if model.config[name] > 0]
-    if used:
-        raise FacesynthError(
-            f"this eFASE model uses {', '.join(used)}, which cannot be exported; train with {' '.join(f'{n}=0' for n in used)}"
-        )
+    """Everything that the runtime needs of a trained database."""
     weights, unit = model.weights(), model.fitted_layout.unit
     order = class_order(model.nodes())
     nodes, names = sorted_nodes(model.nodes(), order), [model.facts["names"][node] for node in order]
@@ -38,6 +35,8 @@ def efase_content(model: Efase) -> Content:
         "rest": model.rest.cpu().numpy(),
         "names": np.frombuffer("\n".join(names).encode(), np.uint8),
     }
+    soft, heard, graphs = _beyond_the_paper(model, order)
+    arrays |= heard
     mean, basis = model.pca.mean.cpu().numpy(), model.pca.basis.cpu().numpy()
 
     def decoded(coordinates: NDArray[Any]) -> NDArray[Any]:
@@ -56,6 +55,7 @@ def efase_content(model: Efase) -> Content:
             decode_graph(basis.T, mean, unit, fps, decoded),
             encode_graph(basis, mean, unit, fps, encoded),
             path_search_graph(),
+            *graphs,
         ),
         settings={
             "database_fps": fps,
@@ -67,7 +67,9 @@ def efase_content(model: Efase) -> Content:
                 "reach_s": model.smoothing.reach_s,
                 "stiffness": model.smoothing.stiffness,
             },
+            **soft,
         },
+        sample_rate=LogMel().sample_rate if graphs else None,
         latency={
             "look_ahead_s": None,
             "about": "a stretch between silences is searched as a whole; with look_ahead=n a node is settled n phones later. "
@@ -83,6 +85,30 @@ def efase_content(model: Efase) -> Content:
             "bounds_scale": "cost, ratio",
         },
     )
+
+
+def _beyond_the_paper(model: Efase, order: Ints) -> tuple[dict[str, Any], dict[str, NDArray[Any]], list[Graph]]:
+    """Settings, arrays and graphs of a model that takes means over paths or hears; settings of 0 for others."""
+    sound_weight, pose_weight = model.audio_weights()
+    settings: dict[str, Any] = {
+        "temperature": model.temperature,
+        "candidates": model.config["candidates"],
+        "sharpening": model.config["sharpening"],
+        "sound_weight": sound_weight,
+        "pose_weight": pose_weight,
+    }
+    arrays: dict[str, NDArray[Any]] = {"numbers": order.astype(np.int32)} if model.temperature > 0 else {}
+    graphs = []
+    if model.audio.sound is not None:
+        more, parts = sound_parts(model.audio.sound, order)
+        settings, arrays = settings | more, arrays | parts
+    if model.audio.predictor is not None:
+        more, parts = predictor_parts(model.audio.predictor)
+        settings, arrays = settings | more, arrays | parts
+        graphs.append(expectation_graph(model.audio.predictor, model.fitted_layout.unit))
+    if not model.audio.empty:
+        graphs.append(log_mel_graph(LogMel()))
+    return settings, arrays, graphs
 
 
 def weights_names() -> tuple[str, ...]:

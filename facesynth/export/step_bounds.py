@@ -8,6 +8,8 @@ captured (free) and steps from another viseme (PNT at least) are left out. 8 bit
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,8 +34,8 @@ def sorted_nodes(nodes: MotionNodes, order: Ints) -> MotionNodes:
     """The same nodes in another order."""
     place = np.full(len(nodes) + 1, -1, np.int64)
     place[order] = np.arange(len(order))
-    columns = (getattr(nodes, name)[order] for name in ("starts", "stops", "phones", "visemes", "emotions"))
-    return MotionNodes(nodes.frames, *columns, place[nodes.before[order]], place[nodes.after[order]])
+    columns = {name: getattr(nodes, name)[order] for name in ("starts", "stops", "phones", "visemes", "emotions")}
+    return replace(nodes, **columns, before=place[nodes.before[order]], after=place[nodes.after[order]])
 
 
 def step_bounds(nodes: MotionNodes, weights: Weights) -> dict[str, NDArray[np.generic]]:

@@ -7,12 +7,27 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
+QUICK_S, ROUGH_S = 0.08, 0.02
+"""Movement between these is raised by `sharpen`; what is quicker is smoothed away."""
+
 
 def gaussian(signal: Floats, sigma: float) -> Floats:
     """A signal [T] smoothed with a Gaussian of `sigma` frames, cut at four of them; the ends are held."""
     reach = int(4 * sigma + 0.5)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     return np.convolve(np.pad(signal, reach, mode="edge"), weights / weights.sum(), mode="valid")
+
+
+def sharpen(frames: Floats, share: float, fps: float) -> Floats:
+    """Frames [T, D] with what they have of quick movement raised by a share; 0 leaves them as they are."""
+    if share == 0:
+        return frames
+    smooth = _each(frames, ROUGH_S * fps)
+    return smooth + share * (smooth - _each(smooth, QUICK_S * fps))
+
+
+def _each(frames: Floats, sigma: float) -> Floats:
+    return np.stack([gaussian(column, sigma) for column in frames.T], axis=1)
 
 
 def butterworth(order: int, cutoff: ArrayLike) -> Floats:

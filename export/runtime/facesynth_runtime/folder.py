@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
+import struct
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +20,9 @@ FORMAT = 2
 MANIFEST = "manifest.json"
 MOST_BYTES = 1 << 24
 """Of a manifest: a larger one is none."""
+ARRAYS = "arrays.npz"
+MOST_HEADER = 1 << 16
+"""Of an array in a file, bytes."""
 KEYS = ("format", "method", "files", "graphs", "arrays", "settings", "latency", "emotions", "phones", "sha256")
 
 
@@ -26,6 +32,8 @@ class Folder:
 
     path: Path
     manifest: dict[str, Any]
+    contents: dict[str, bytes]
+    """Of every file, as it was when its hash was found right: nothing is read a second time."""
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -34,16 +42,17 @@ class Folder:
         return settings
 
     def bytes_of(self, name: str) -> bytes:
-        """A file's content; RuntimeInputError where it is not what was exported."""
-        return checked_bytes(self.path / name, self.manifest["files"].get(name))
+        """A file's content; RuntimeInputError where the manifest does not list it."""
+        if name not in self.contents:
+            raise RuntimeInputError(f"{self.path / name} is not listed in the manifest; export the model again")
+        return self.contents[name]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All arrays, with the types and shapes that the manifest states."""
-        path = self.path / "arrays.npz"
+        """All arrays, with the types and shapes that the manifest states; they cannot be written to."""
+        path = self.path / ARRAYS
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                found = {name: stored[name] for name in self.manifest["arrays"]}
-        except (OSError, ValueError, KeyError) as error:
+            found = _members(self.bytes_of(ARRAYS), list(self.manifest["arrays"]))
+        except (zipfile.BadZipFile, ValueError, KeyError) as error:
             raise RuntimeInputError(f"{path}: cannot be read ({error}); export the model again") from None
         for name, wanted in self.manifest["arrays"].items():
             got = found[name]
@@ -58,17 +67,38 @@ def open_folder(path: str | Path) -> Folder:
     """Read the manifest and compare the hash of every file with it; RuntimeInputError names the file that is wrong."""
     folder = Path(path)
     manifest = _manifest(folder / MANIFEST)
+    contents = {}
     for name, wanted in manifest["files"].items():
         if Path(name).name != name:
             raise RuntimeInputError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
-        checked_bytes(folder / name, wanted)
-    return Folder(folder, manifest)
+        contents[name] = checked_bytes(folder / name, wanted)
+    return Folder(folder, manifest, contents)
+
+
+def _members(content: bytes, names: list[str]) -> dict[str, NDArray[Any]]:
+    """Arrays of an uncompressed npz as views of its bytes, whose hash is known: nothing is copied or summed up again."""
+    found = {}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for name in names:
+            entry = archive.getinfo(f"{name}.npy")
+            if entry.compress_type != zipfile.ZIP_STORED:
+                raise ValueError(f"{name} is compressed")
+            name_bytes, extra_bytes = struct.unpack_from("<HH", content, entry.header_offset + 26)
+            start = entry.header_offset + 30 + name_bytes + extra_bytes
+            member = io.BytesIO(content[start : start + min(entry.file_size, MOST_HEADER)])
+            version = np.lib.format.read_magic(member)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, in_columns, dtype = read(member)
+            if dtype.hasobject:
+                raise ValueError(f"{name} holds objects")
+            count = int(np.prod(shape, dtype=np.int64))
+            flat = np.frombuffer(content, dtype, count, start + member.tell())
+            found[name] = flat.reshape(shape, order="F" if in_columns else "C")
+    return found
 
 
 def checked_bytes(path: Path, wanted: Any) -> bytes:
     """The content of a file whose size and sha256 are as wanted."""
-    if wanted is None:
-        raise RuntimeInputError(f"{path} is not listed in the manifest; export the model again")
     try:
         content = path.read_bytes()
     except OSError as error:

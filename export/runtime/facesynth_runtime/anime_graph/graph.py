@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from facesynth_runtime.anime_graph.hearing import Floats, Ints, audio_costs
 from facesynth_runtime.errors import RuntimeInputError
 from facesynth_runtime.graphs import Graph as OnnxGraph
+from facesynth_runtime.posterior import posterior
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,12 @@ class Weights:
     jump: float
     jump_cost: float
     audio: float
+    pose: float
+
+    def target(self, step: Step) -> Floats:
+        """[n] what each candidate costs, wherever one comes from."""
+        cost = self.audio * step.audio
+        return cost if step.pose is None else cost + self.pose * step.pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +39,8 @@ class Wish:
     wanted: Floats
     """[m, P]"""
     frames: int
+    expected: Floats | None = None
+    """[frames, D] pose that the sound leads one to expect, as components times metric."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +63,8 @@ class Step:
     """[n] the candidate before that was recorded just before, or -1."""
     jumps: Floats
     """[n, n before] cost of jumping there; infinite from the linked one."""
+    pose: Floats | None = None
+    """[n] mean squared distance from the expected pose."""
 
 
 class Nodes:
@@ -127,7 +138,7 @@ class Nodes:
         """[n] how differently nodes sound from wanted [m, P]."""
         return audio_costs(wanted, self.features, self.feature_starts[nodes], self.feature_stops[nodes])
 
-    def step(self, candidates: Candidates, before: tuple[Candidates, Step] | None, wanted: Floats, weights: Weights) -> Step:
+    def step(self, candidates: Candidates, before: tuple[Candidates, Step] | None, wish: Wish, weights: Weights) -> Step:
         """Costs of the candidates of one phone, after those of the phone before."""
         nodes = candidates.nodes
         ends = [self.frames[self.starts[nodes]], self.frames[self.stops[nodes] - 1]]
@@ -136,9 +147,10 @@ class Nodes:
             for end in ends:
                 end[through] = self.mapped(end[through], number)
         first, last = (end @ self.metric for end in ends)
-        audio, none = self.sound_costs(wanted, nodes), np.full(len(nodes), -1, np.int64)
+        audio, none = self.sound_costs(wish.wanted, nodes), np.full(len(nodes), -1, np.int64)
+        pose = None if wish.expected is None else self._pose_costs(candidates, wish.expected)
         if before is None:
-            return Step(audio, last, none, np.zeros((len(nodes), 0)))
+            return Step(audio, last, none, np.zeros((len(nodes), 0)), pose)
         place = np.full(len(self) + 1, -1, np.int64)
         place[before[0].nodes] = np.arange(len(before[0].nodes))
         link = place[self.before[nodes]]
@@ -148,12 +160,34 @@ class Nodes:
         jumps = weights.jump + weights.jump_cost * np.sqrt(np.maximum(squared, 0.0))
         linked = np.flatnonzero(link >= 0)
         jumps[linked, link[linked]] = np.inf
-        return Step(audio, last, link, jumps)
+        return Step(audio, last, link, jumps, pose)
+
+    def _pose_costs(self, candidates: Candidates, expected: Floats) -> Floats:
+        """[n] mean over frames of the squared distance of each candidate, stretched evenly, to the expected pose."""
+        if not len(expected):
+            return np.zeros(len(candidates.nodes))
+        motions = self._stretched(candidates.nodes, len(expected))
+        for number in np.unique(candidates.maps[candidates.maps >= 0]).tolist():
+            through = candidates.maps == number
+            flat = motions[through].reshape(-1, motions.shape[2])
+            motions[through] = self.mapped(flat, number).reshape(-1, *motions.shape[1:])
+        apart = motions @ self.metric - expected
+        return np.einsum("nkd,nkd->n", apart, apart) / len(expected)
+
+    def _stretched(self, which: Ints, count: int) -> Floats:
+        """[n, count, D] the motions of some nodes, each time-warped to `count` frames."""
+        lengths = self.stops[which] - self.starts[which]
+        share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)
+        at = np.where(np.equal(lengths, count)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
+        low = np.minimum(at.astype(np.int64), np.maximum(lengths - 2, 0)[:, None])
+        high = np.minimum(low + 1, (lengths - 1)[:, None])
+        part, first = (at - low)[..., None], self.starts[which][:, None]
+        return self.frames[first + low] * (1 - part) + self.frames[first + high] * part
 
 
 def best_path(steps: Sequence[Step], weights: Weights, *, start: int | None = None) -> tuple[Ints, float]:
     """The candidates [T] of least cost (eq. 2), and that cost; `start` prescribes the first."""
-    phi = weights.audio * steps[0].audio
+    phi = weights.target(steps[0])
     if start is not None:
         phi = np.where(np.arange(len(phi)) == start, phi, np.inf)
     origins = []
@@ -163,11 +197,21 @@ def best_path(steps: Sequence[Step], weights: Weights, *, start: int | None = No
         best = total[np.arange(len(total)), origin]
         free = np.where(step.link >= 0, phi[step.link], np.inf)
         origins.append(np.where(free <= best, step.link, origin))
-        phi = np.minimum(free, best) + weights.audio * step.audio
+        phi = np.minimum(free, best) + weights.target(step)
     path = [int(phi.argmin())]
     for origin in reversed(origins):
         path.append(int(origin[path[-1]]))
     return np.array(path[::-1], np.int64), float(phi.min())
+
+
+def soft_path(steps: Sequence[Step], weights: Weights, temperature: float) -> list[Floats]:
+    """The posterior probability [n] of each candidate of each phone."""
+    moves = []
+    for step in steps[1:]:
+        cost, linked = step.jumps.copy(), np.flatnonzero(step.link >= 0)
+        cost[linked, step.link[linked]] = 0.0
+        moves.append(-cost.T / temperature)
+    return posterior([-weights.target(step) / temperature for step in steps], moves).shares()
 
 
 class LookAhead:

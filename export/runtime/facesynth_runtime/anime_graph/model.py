@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from facesynth_runtime.anime_graph.assembly import Blender, make_piece
 from facesynth_runtime.anime_graph.closure import close_at, keep_shut
-from facesynth_runtime.anime_graph.graph import Candidates, LookAhead, Nodes, Step, Weights, Wish, best_path
+from facesynth_runtime.anime_graph.graph import Candidates, LookAhead, Nodes, Step, Weights, Wish, best_path, soft_path
 from facesynth_runtime.anime_graph.hearing import Ear, Floats, Ints
 from facesynth_runtime.anime_graph.stream import AnimeStream
 from facesynth_runtime.errors import RuntimeInputError, reject_options, unknown
-from facesynth_runtime.filters import butterworth, forth_and_back, gaussian
+from facesynth_runtime.filters import butterworth, forth_and_back, gaussian, sharpen
 from facesynth_runtime.folder import Folder
 from facesynth_runtime.graphs import Graph
 from facesynth_runtime.sound import resample
 from facesynth_runtime.tracks import Layout, Motion, checked_audio, checked_rate, emotions_of_phones, frame_bounds
 
+if TYPE_CHECKING:
+    from facesynth_runtime.expectation import Expectation
+
 BILABIALS = frozenset(["p", "b", "m"])
 NEUTRAL = "neutral"
 EMOTION_CHANGES_S, SMALLEST_SWING = 0.08, 1e-4
+LEAST_SHARE = 1e-3
+"""Candidates that are less probable than this are left out of a mean."""
 PASS_ALL, ORDER = 0.98, 6
 OPTIONS = ("seed", "look_ahead", "to_emotion", "to_intensity")
 
@@ -60,6 +65,11 @@ class AnimeGraph:
         self.nodes = Nodes(arrays, [viseme for _, viseme in manifest["phones"]], self.pairs, maps)
         self._mixing, self._cutoffs = arrays["mixing"], arrays["cutoffs_hz"]
         self._dropped = arrays.get("dropped")
+        self.expectation: Expectation | None = None
+        if self.weights.pose > 0:
+            from facesynth_runtime.expectation import Bands, Expectation  # only models that expect need it
+
+            self.expectation, self._bands = Expectation(folder, arrays, threads), Bands(folder, threads)
         self._plp, self._encode, self._decode = (Graph(folder, name, threads) for name in ("rasta_plp", "encode", "decode"))
 
     @property
@@ -86,7 +96,8 @@ class AnimeGraph:
         reject_options("anime_graph", options, OPTIONS)
         plan = self.plan(speech, look_ahead=look_ahead)
         bounds = frame_bounds(speech.phones.ends_s, self.fps)
-        frames = self.decode(self.low_pass(self._blended(plan)))
+        joined = self._mean(plan) if self.settings["temperature"] > 0 else self._blended(plan)
+        frames = self.decode(sharpen(self.low_pass(joined), self.settings["sharpening"], self.fps))
         spans = [
             (int(a), int(b)) for p, a, b in zip(speech.phones.labels, bounds[:-1], bounds[1:], strict=True) if p in BILABIALS
         ]
@@ -101,7 +112,7 @@ class AnimeGraph:
         steps: list[Step] = []
         for t, wish in enumerate(wishes):
             before = (candidates[t - 1], steps[t - 1]) if t else None
-            steps.append(self.nodes.step(candidates[t], before, wish.wanted, self.weights))
+            steps.append(self.nodes.step(candidates[t], before, wish, self.weights))
         if look_ahead is None:
             return Plan(wishes, candidates, steps, *best_path(steps, self.weights))
         search = LookAhead(self.weights, look_ahead)
@@ -124,7 +135,18 @@ class AnimeGraph:
         bounds, lengths = frame_bounds(ends_s, self.settings["feature_fps"]), np.diff(frame_bounds(ends_s, self.fps))
         starts = np.minimum(bounds[:-1], len(features) - 1)
         stops = np.maximum(np.minimum(bounds[1:], len(features)), starts + 1)
-        return [Wish(*n, features[a:b], int(c)) for n, a, b, c in zip(numbers, starts, stops, lengths, strict=True)]
+        poses = self._expected(self.expectation, speech, numbers, ends_s) if self.expectation else [None] * len(labels)
+        each = zip(numbers, starts, stops, lengths, poses, strict=True)
+        return [Wish(*n, features[a:b], int(count), pose) for n, a, b, count, pose in each]
+
+    def _expected(
+        self, expectation: Expectation, speech: Any, numbers: Sequence[tuple[int, int]], ends_s: Floats
+    ) -> list[Floats]:
+        """The expected pose over each phone."""
+        said, felt = zip(*numbers, strict=True)
+        bounds = frame_bounds(ends_s, self.fps)
+        poses = expectation.poses(self._bands.of(speech), said, ends_s, felt, self.fps, int(bounds[-1]))
+        return np.split(poses, bounds[1:-1])
 
     def map_emotion(self, motion: Motion, source: str, target: str, *, intensity: Floats | float = 1.0) -> Motion:
         """Any motion of the model's layout from one emotion to another; intensity 0..1, a number or one per frame [T]."""
@@ -156,6 +178,11 @@ class AnimeGraph:
 
     def stream(self, *, look_ahead: int = 4, sample_rate: int | None = None) -> AnimeStream:
         """Sound and phones as they come in; a node is settled when `look_ahead` phones (the paper: 3 to 6) follow it."""
+        if self.weights.pose > 0 or self.settings["temperature"] > 0 or self.settings["sharpening"] > 0:
+            raise RuntimeInputError(
+                "this model takes means over paths, expects poses or is sharpened: it wants whole utterances; for streams export "
+                "one trained with temperature=0 pose_weight=0 sharpening=0"
+            )
         checked_rate(self.rate if sample_rate is None else sample_rate, self.rate)
         return AnimeStream(self, look_ahead)
 
@@ -197,8 +224,19 @@ class AnimeGraph:
             blender.add(make_piece(self.nodes, wish, candidates, chosen), captured)
         return np.concatenate([blender.blended(t) for t in range(len(blender.pieces))])
 
+    def _mean(self, plan: Plan) -> Floats:
+        """[frames, D] each phone the mean of its candidates, brought to its time."""
+        frames = []
+        for wish, candidates, shares in zip(
+            plan.wishes, plan.candidates, soft_path(plan.steps, self.weights, self.settings["temperature"]), strict=True
+        ):
+            likely = np.flatnonzero(shares >= min(LEAST_SHARE, shares.max()))
+            pieces = np.stack([make_piece(self.nodes, wish, candidates, int(i)).motion for i in likely])
+            frames.append(np.tensordot(shares[likely] / shares[likely].sum(), pieces, 1))
+        return np.concatenate(frames)
+
     def _cost(self, steps: Sequence[Step], path: Ints) -> float:
-        cost = sum(self.weights.audio * float(step.audio[c]) for step, c in zip(steps, path, strict=True))
+        cost = sum(float(self.weights.target(step)[c]) for step, c in zip(steps, path, strict=True))
         for t in range(1, len(path)):
             if steps[t].link[path[t]] != path[t - 1]:
                 cost += float(steps[t].jumps[path[t], path[t - 1]])

@@ -80,7 +80,7 @@ class AnimeStream:
             wish = Wish(phone, emotion, features[start : max(min(stop, len(features)), start + 1)], frames)
             candidates = model.nodes.candidates(phone, emotion)
             before = self._steps[-1][1:] if self._steps else None
-            step = model.nodes.step(candidates, before, wish.wanted, model.weights)
+            step = model.nodes.step(candidates, before, wish, model.weights)
             self._steps.append((wish, candidates, step))
             self._settle(self.search.push(step))
         return self._emit(last=False)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth_runtime.efase.nodes import Floats, Ints, Nodes
+from facesynth_runtime.efase.soft import Mixture, stretched
 from facesynth_runtime.filters import butterworth, forth_and_back, smoothed, spline_at, time_warp
 from facesynth_runtime.tracks import SILENCE, Layout
 
@@ -16,6 +17,19 @@ FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
 LOOSE = frozenset(["k", "g", "ch", "ng", "r"])
 SETTLE_S, WAKE_S, CLOSE_S = 0.25, 0.2, 0.03
 PASS = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The result of a search."""
+
+    nodes: Ints
+    """[P] a node of the folder for each phone; -1 in silence."""
+    cost: float
+    mixtures: Sequence[Mixture | None] = ()
+    """[P] nodes that may stand at each phone, None in silence; empty where only the cheapest path counts."""
+    expected: Floats | None = None
+    """[T, D] pose that the sound leads one to expect; None where nothing predicts it."""
 
 
 @dataclass(frozen=True)
@@ -29,34 +43,44 @@ class Smoothing:
 
 
 def concatenate(
-    nodes: Nodes, path: Ints, phones: Sequence[str], bounds: Ints, rest: Floats, fps: float, smoothing: Smoothing
+    nodes: Nodes, plan: Plan, phones: Sequence[str], bounds: Ints, rest: Floats, fps: float, smoothing: Smoothing
 ) -> Floats:
-    """Coordinates [T, D]: path [P] a node for each phone, bounds [P + 1] first frames, rest [P, D] the rest pose at each."""
+    """Coordinates [T, D]: bounds [P + 1] first frames of the phones, rest [P, D] the rest pose at each."""
     frames = np.zeros((bounds[-1], nodes.frames.shape[1]))
+    path, mixtures = plan.nodes, plan.mixtures or [None] * len(phones)
     spoken = np.array([phone != SILENCE for phone in phones])
-    for node, speaks, start, stop in zip(path, spoken, bounds[:-1], bounds[1:], strict=True):
-        if speaks and stop > start:
-            frames[start:stop] = time_warp(nodes.motion(int(node)), int(stop - start))
+    for t in np.flatnonzero(spoken & (np.diff(bounds) > 0)).tolist():
+        start, stop, mixture = int(bounds[t]), int(bounds[t + 1]), mixtures[t]
+        frames[start:stop] = (
+            np.tensordot(mixture.shares, stretched(nodes, mixture.nodes, stop - start), 1)
+            if mixture
+            else time_warp(nodes.motion(int(path[t])), stop - start)
+        )
     kind = [smoothing.firm if phone in FIRM else smoothing.loose if phone in LOOSE else 1.0 for phone in phones]
     weights = np.repeat(kind, np.diff(bounds))
     reach, stiffness = max(3, round(smoothing.reach_s * fps)), smoothing.stiffness * (fps / 120) ** 3
     for t in range(1, len(path)):
-        if not (spoken[t] and spoken[t - 1]) or nodes.before[path[t]] == path[t - 1]:
+        mixture = mixtures[t]
+        strength = 1 - mixture.captured if mixture else float(nodes.before[path[t]] != path[t - 1])
+        if not (spoken[t] and spoken[t - 1]) or strength <= 0:
             continue
         # The phone that holds the joint's frame: one too short for a frame hands the joint on to the next.
         holder = int(np.searchsorted(bounds, bounds[t], side="right")) - 1
         if 0 < holder < len(path):
             inside = min(reach, int(bounds[holder] - bounds[holder - 1]), int(bounds[holder + 1] - bounds[holder]))
             if inside > 0:
-                _smooth_joint(frames, int(bounds[t]), inside, weights, stiffness)
+                _smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ~spoken, [False]]).astype(int)))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
+        if plan.expected is None:
+            _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
+        else:
+            _follow(frames, int(bounds[first]), int(bounds[stop]), plan.expected, fps)
     return frames
 
 
-def _smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float) -> None:
-    """The jump smoothed by a smoothing spline whose correction fades to 0 at the outer frames (eq. 13)."""
+def _smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float, strength: float) -> None:
+    """A share `strength` of the jump smoothed by a smoothing spline whose correction fades to 0 at the outer frames (eq. 13)."""
     first, stop = max(joint - reach, 0), min(joint + reach, len(frames))
     piece = frames[first:stop]
     if len(piece) < 3:
@@ -69,7 +93,7 @@ def _smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiff
         correction = np.linalg.solve(system, weights[first:stop, None] * piece) - piece
     rise = np.clip(np.arange(len(piece)) / max(joint - first - 1, 1), 0, 1)
     fall = np.clip(np.arange(len(piece))[::-1] / max(stop - joint - 1, 1), 0, 1)
-    frames[first:stop] = piece + np.minimum(rise, fall)[:, None] * correction
+    frames[first:stop] = piece + strength * np.minimum(rise, fall)[:, None] * correction
 
 
 def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: float) -> None:
@@ -88,6 +112,21 @@ def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: floa
     else:
         share = _ease(k / (count + 1))
         frames[start:stop] = (1 - share) * before + share * after
+
+
+def _follow(frames: Floats, start: int, stop: int, expected: Floats, fps: float) -> None:
+    """Silence as expected; how far speech was from that at either side fades as fast as the face settles and wakes."""
+    count = stop - start
+    if count <= 0:
+        return
+    k = np.arange(1, count + 1)[:, None]
+    frames[start:stop] = expected[start:stop]
+    if start > 0:
+        leave = _ease(k / min(round(SETTLE_S * fps), count + 1))
+        frames[start:stop] += (1 - leave) * (frames[start - 1] - expected[start - 1])
+    if stop < len(frames):
+        arrive = _ease((count + 1 - k) / min(round(WAKE_S * fps), count + 1))
+        frames[start:stop] += (1 - arrive) * (frames[stop] - expected[stop])
 
 
 def _ease(u: NDArray[np.float64]) -> Floats:

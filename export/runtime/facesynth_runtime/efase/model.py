@@ -3,37 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth_runtime.efase.assembly import Smoothing, at_rate, close_lips, concatenate, gap
+from facesynth_runtime.efase.assembly import Plan, Smoothing, at_rate, close_lips, concatenate, gap
 from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Floats, Ints, Nodes, Query, Weights
 from facesynth_runtime.efase.search import Search
+from facesynth_runtime.efase.soft import Mixture, Softness, mixtures
 from facesynth_runtime.efase.stream import EfaseStream
 from facesynth_runtime.errors import RuntimeInputError, reject_options, unknown
-from facesynth_runtime.filters import gaussian
+from facesynth_runtime.filters import gaussian, sharpen
 from facesynth_runtime.folder import Folder
 from facesynth_runtime.graphs import Graph
 from facesynth_runtime.tracks import SILENCE, Layout, Motion, emotions_of_phones, frame_bounds
+
+if TYPE_CHECKING:
+    from facesynth_runtime.efase.hearing import Heard, Hearing
 
 BILABIALS = frozenset(["p", "b", "m"])
 LIP_PHONES = BILABIALS | {"f", "v"}
 NEUTRAL = "neutral"
 SMOOTH_S = 0.08
 OPTIONS = ("seed", "fps", "constraints", "look_ahead")
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The result of a search."""
-
-    nodes: Ints
-    """[P] a node of the folder for each phone; -1 in silence."""
-    cost: float
 
 
 class Efase:
@@ -53,6 +48,14 @@ class Efase:
         self._names = arrays["names"].tobytes()
         self._known: dict[str, int] | None = None
         self._decode = Graph(folder, "decode", threads)
+        soft = settings["temperature"] > 0
+        self.softness = Softness(settings["temperature"], settings["candidates"], arrays["numbers"]) if soft else None
+        self.hearing: Hearing | None = None
+        if settings["sound_weight"] > 0 or settings["pose_weight"] > 0:
+            from facesynth_runtime.efase.hearing import Hearing  # only models that hear need it
+
+            self.hearing = Hearing(folder, arrays, self.nodes, threads)
+        self._gaps: dict[int, float] = {}
 
     @property
     def names(self) -> list[str]:
@@ -80,6 +83,8 @@ class Efase:
         does, in place of the whole search.
         """
         reject_options("efase", options, OPTIONS)
+        if look_ahead is not None:
+            self._require_steps()
         new_fps = self.fps if fps is None else float(fps)
         if not (np.isfinite(new_fps) and new_fps > 0):
             raise RuntimeInputError(f"fps is {fps}; wanted a positive rate in Hz, or None for the model's {self.fps:g}")
@@ -89,7 +94,7 @@ class Efase:
         plans = [self.plan(speech, constraints=constraints, look_ahead=look_ahead)]
         if weak:
             plans.append(self.plan(speech, emotion=NEUTRAL, constraints=constraints, look_ahead=look_ahead))
-        frames = self.frames([plan.nodes for plan in plans], labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
+        frames = self.frames(plans, labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
         return Motion(self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1])), new_fps, self.layout)
 
     def plan(
@@ -107,6 +112,10 @@ class Efase:
         queries = [
             self.query(label, feeling, fixed.get(t, -1)) for t, (label, feeling) in enumerate(zip(labels, feelings, strict=True))
         ]
+        heard = self._heard(self.hearing, speech, queries) if self.hearing else None
+        if heard is not None:
+            queries = [replace(query, heard=costs) for query, costs in zip(queries, heard.costs, strict=True)]
+        mixed: list[Mixture | None] = [None] * len(labels)
         nodes, cost, stretch = np.full(len(labels), -1, np.int64), 0.0, Stretch(self, look_ahead)
         whole = self.settings["bridge_pauses"]
         for t, query in enumerate(queries):
@@ -115,16 +124,20 @@ class Efase:
             if t + 1 == len(queries) or (queries[t + 1].phone < 0 and not whole):
                 path = stretch.finish()
                 if len(path):
-                    nodes[t + 1 - len(path) : t + 1] = path
+                    own = slice(t + 1 - len(path), t + 1)
+                    nodes[own] = path
                     cost += stretch.search.cost(path)
+                    if self.softness:
+                        mixed[own] = mixtures(self.nodes, queries[own], path, self.softness)
                 stretch = Stretch(self, look_ahead)
-        return Plan(nodes, cost)
+        return Plan(nodes, cost, mixed if self.softness else (), heard.poses if heard else None)
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one. Without `look_ahead`, a stretch is searched as a whole and settled by the silence after it.
 
         weakened: intensities below 1 will come; then every phone is searched for in neutral, too.
         """
+        self._require_steps()
         return EfaseStream(self, look_ahead, weakened, self.fps if fps is None else fps)
 
     def query(self, label: str, emotion: str, node: int = -1) -> Query:
@@ -140,17 +153,17 @@ class Efase:
         return Query(index, viseme, feeling, node, label in LIP_PHONES and viseme in self._captured and node < 0)
 
     def frames(
-        self, paths: Sequence[Ints], labels: Sequence[str], feelings: Sequence[str], intensity: Floats, bounds: Ints
+        self, plans: Sequence[Plan], labels: Sequence[str], feelings: Sequence[str], intensity: Floats, bounds: Ints
     ) -> Floats:
-        """[T, C] at the database's rate; two paths are one in the emotions and one in neutral, mixed by intensity [P]."""
+        """[T, C] at the database's rate; two plans are one in the emotions and one in neutral, mixed by intensity [P]."""
         moods: list[Sequence[str]] = [feelings, [NEUTRAL] * len(labels)]
-        made = [self._decoded(path, labels, mood, bounds) for path, mood in zip(paths, moods, strict=False)]
+        made = [self._decoded(plan, labels, mood, bounds) for plan, mood in zip(plans, moods, strict=False)]
         frames = made[0]
         if len(made) > 1:
             share = gaussian(np.repeat(intensity, np.diff(bounds)), SMOOTH_S * self.database_fps)[:, None]
             frames = made[1] + share * (made[0] - made[1])
         if self.has_lips:
-            wanted = np.max([self._closures(path, labels) for path in paths], axis=0)
+            wanted = np.max([self._closures(plan, labels) for plan in plans], axis=0)
             frames = close_lips(frames, wanted, self.layout, bounds, self.database_fps)
         return frames.astype(np.float32).astype(np.float64)
 
@@ -164,21 +177,46 @@ class Efase:
                 made = np.clip(made, frames.min(axis=0), frames.max(axis=0))
         return made[np.minimum(np.arange(count), len(made) - 1)].astype(np.float32)
 
-    def _decoded(self, path: Ints, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
+    def _require_steps(self) -> None:
+        """A mean over paths, and a pose that is expected, look at the whole of what is said."""
+        if self.softness or self.hearing or self.settings["sharpening"] > 0:
+            raise RuntimeInputError(
+                "this model takes means over paths or hears: it wants whole utterances; for streams and look_ahead export one "
+                "trained with temperature=0 audio_weight=0 pose_weight=0 sharpening=0"
+            )
+
+    def _heard(self, hearing: Hearing, speech: Any, queries: Sequence[Query]) -> Heard:
+        said = [self.phones[label][0] for label in speech.phones.labels]
+        spoken = np.array([label != SILENCE for label in speech.phones.labels])
+        bounds = frame_bounds(np.asarray(speech.phones.ends_s, np.float64), self.database_fps)
+        return hearing.hear(speech, said, [query.emotion for query in queries], spoken, bounds)
+
+    def _decoded(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         rest = self.rest[[self.emotions.index(feeling) for feeling in feelings]]
-        coordinates = concatenate(self.nodes, path, labels, bounds, rest, self.database_fps, self.smoothing)
-        return self._frames_of(coordinates)
+        coordinates = concatenate(self.nodes, plan, labels, bounds, rest, self.database_fps, self.smoothing)
+        return self._frames_of(sharpen(coordinates, self.settings["sharpening"], self.database_fps))
 
     def _frames_of(self, coordinates: Floats) -> Floats:
         return self._decode(coordinates=coordinates.astype(np.float32)[None])[0][0].astype(np.float64)
 
-    def _closures(self, path: Ints, labels: Sequence[str]) -> Floats:
-        """[P] smallest lip gap of the node at each p, b, m as it was captured; NaN elsewhere."""
+    def _closures(self, plan: Plan, labels: Sequence[str]) -> Floats:
+        """[P] smallest lip gap of the node at each p, b, m as it was captured (the mean of a mixture's); NaN elsewhere."""
         wanted = np.full(len(labels), np.nan)
-        for k, (label, node) in enumerate(zip(labels, path, strict=True)):
+        for k, (label, node) in enumerate(zip(labels, plan.nodes.tolist(), strict=True)):
             if label in BILABIALS and node >= 0:
-                wanted[k] = gap(self._frames_of(self.nodes.motion(int(node))), self.layout).min()
+                mixture = plan.mixtures[k] if plan.mixtures else None
+                gaps = self._gaps_of(mixture.nodes.tolist() if mixture else [node])
+                wanted[k] = np.dot(mixture.shares, gaps) if mixture else gaps[0]
         return wanted
+
+    def _gaps_of(self, which: list[int]) -> list[float]:
+        """Smallest lip gap of some nodes as they were captured."""
+        new = [node for node in which if node not in self._gaps]
+        if new:
+            frames = self._frames_of(np.concatenate([self.nodes.motion(node) for node in new]))
+            parts = np.split(gap(frames, self.layout), np.cumsum(self.nodes.lengths[new])[:-1])
+            self._gaps |= {node: float(part.min()) for node, part in zip(new, parts, strict=True)}
+        return [self._gaps[node] for node in which]
 
     def _node_index(self, t: int, name: str, labels: Sequence[str]) -> int:
         if not 0 <= t < len(labels):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth_runtime.efase.assembly import SETTLE_S, WAKE_S
+from facesynth_runtime.efase.assembly import SETTLE_S, WAKE_S, Plan
 from facesynth_runtime.efase.nodes import Ints
 from facesynth_runtime.errors import RuntimeInputError
 from facesynth_runtime.tracks import SILENCE, frame_bounds
@@ -118,9 +118,9 @@ class EfaseStream:
         oldest = (start / self.fps - HISTORY_S) * model.database_fps
         first = max(0, int(np.searchsorted(bounds, oldest, side="right")) - 1)
         zero = int(bounds[first])
-        paths = [np.array(path[first:known], np.int64) for path in self.paths]
+        plans = [Plan(np.array(path[first:known], np.int64), 0.0) for path in self.paths]
         own = slice(first, known)
-        frames = model.frames(paths, self.labels[own], self.feelings[own], np.array(self.intensity[own]), bounds[first:] - zero)
+        frames = model.frames(plans, self.labels[own], self.feelings[own], np.array(self.intensity[own]), bounds[first:] - zero)
         if self.fps == model.database_fps:
             return frames[np.minimum(np.arange(start, stop) - zero, len(frames) - 1)].astype(np.float32)
         from facesynth_runtime.efase.assembly import at_rate
