@@ -40,10 +40,8 @@ def main() -> None:
     total_s = sum(speech.phones.duration_s for speech in chosen)
     print(f"{len(chosen)} sentences, {total_s:.0f} s of speech, {sum(len(speech.phones) for speech in chosen)} phones")
     print("Seconds, and real-time factors by the clock: mean over sentences, and the worst one; of the processor in brackets.\n")
-    print(
     print("| folder | method | MB | start, s | 1 thread | worst | 2 threads | worst | streaming |")
     print("|---|---|---:|---:|---:|---:|---:|---:|---|")
-    )
     for folder in options.folders:
         row(folder, chosen)
 

@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facesynth.export.graph import difference
+from facesynth.export.models import export_model
 from facesynth.methods.anime_graph.audio_cost import audio_costs as torch_costs
 from facesynth.methods.anime_graph.audio_cost import warp_path as torch_path
 from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.efase import prediction
 from facesynth.speech.speech import EmotionTrack, Speech
 
 
@@ -118,3 +120,27 @@ def test_what_is_wrong_is_named(pair, speeches):
     silent = Speech(np.zeros(16000, np.float32), 16000, speeches[0].phones, speeches[0].emotions)
     with pytest.raises(RuntimeInputError, match="constant"):
         runtime.synthesize(silent)
+
+
+@pytest.fixture(scope="module")
+def soft_pair(small_corpus, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("soft")
+    soft = {"temperature": 2.0, "jump_weight": 10.0, "jump_cost_weight": 3.0, "audio_weight": 1.5}
+    soft |= {"pose_weight": 20.0, "sharpening": 0.8}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prediction, "STEPS", 5)  # how well it predicts does not matter here
+        model = AnimeGraph(map_centres=40, emotional_components=[0, 2], **soft).fit(small_corpus)
+    model.save(folder / "model.safetensors")
+    export_model(folder / "model.safetensors", folder / "exported")
+    return model, load(folder / "exported")
+
+
+def test_means_over_paths_are_those_of_torch(soft_pair, speeches):
+    model, runtime = soft_pair
+    for speech in speeches:
+        wanted, got = model.plan(speech), runtime.plan(speech)
+        assert got.cost == pytest.approx(wanted.cost, rel=1e-5)
+        assert np.array_equal(got.nodes, wanted.nodes)
+        assert difference(runtime.synthesize(speech).frames, model.synthesize(speech).frames) < 1e-4
+    with pytest.raises(RuntimeInputError, match="temperature=0"):
+        runtime.stream()

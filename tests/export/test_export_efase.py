@@ -11,10 +11,10 @@ from scipy.interpolate import make_interp_spline, make_smoothing_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from facesynth.errors import FacesynthError
 from facesynth.export.graph import difference
 from facesynth.export.models import export_model
 from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
+from facesynth.methods.efase import prediction
 from facesynth.methods.efase.costs import Query as TorchQuery
 from facesynth.methods.efase.costs import Weights as TorchWeights
 from facesynth.methods.efase.costs import path_cost
@@ -173,10 +173,49 @@ def test_what_is_wrong_is_named(pair, speeches):
         stream.push("aa", 0.2, "happy", 0.5)
 
 
-def test_a_model_with_another_search_is_not_exported(small_corpus, tmp_path):
-    Efase(components=4, temperature=0.3).fit(small_corpus).save(tmp_path / "soft.safetensors")
-    with pytest.raises(FacesynthError, match="temperature"):
-        export_model(tmp_path / "soft.safetensors", tmp_path / "folder")
+SOFT = {
+    "soft": {"audio_weight": 0.0, "pose_weight": 0.0, "sharpening": 0.0, "candidates": 20},
+    "softly heard": {},
+    "heard": {"temperature": 0.0, "sharpening": 0.0},
+}
+
+
+@pytest.fixture(scope="module")
+def soft_model(small_corpus):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prediction, "STEPS", 5)  # how well it predicts does not matter here
+        model = Efase(components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, sharpening=0.8).fit(
+            small_corpus
+        )
+    model.audio.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
+    return model
+
+
+@pytest.fixture(scope="module", params=SOFT)
+def soft_pair(request, soft_model, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("soft")
+    model = soft_model.with_weights(**SOFT[request.param])
+    model.save(folder / "model.safetensors")
+    export_model(folder / "model.safetensors", folder / "exported")
+    return model, load(folder / "exported")
+
+
+@pytest.mark.parametrize("intensity", [1.0, 0.4])
+def test_means_over_paths_and_what_is_heard_are_those_of_torch(soft_pair, speeches, intensity):
+    model, runtime = soft_pair
+    for speech in speeches:
+        asked = weakened(speech, intensity)
+        wanted, got = model.plan(asked), runtime.plan(asked)
+        assert got.cost == pytest.approx(wanted.cost, rel=1e-5, abs=1e-9)
+        assert names_of(runtime, got.nodes) == names_of(model, wanted.nodes)
+        assert difference(runtime.synthesize(asked).frames, model.synthesize(asked).frames) < 1e-4
+
+
+def test_a_model_that_looks_at_the_whole_does_not_stream(soft_pair, speeches):
+    _, runtime = soft_pair
+    for ask in (runtime.stream, lambda: runtime.synthesize(speeches[0], look_ahead=3)):
+        with pytest.raises(RuntimeInputError, match="temperature=0"):
+            ask()
 
 
 def test_fewer_bits_are_smaller_and_move_nearly_the_same(efase_file, exported, pair, speeches):
