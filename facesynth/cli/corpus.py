@@ -98,6 +98,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--licence", help="Of these recordings; the corpus' own otherwise.")
 @click.option("--consent", help="Who agreed to what; the corpus' own otherwise.")
 @click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
+@click.option("--sound", type=FILE, help="One long sound of a recorder that ran on for several videos: each finds its part.")
 @click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
 @click.option("--points", is_flag=True, help="Follow salient points of the lower face, for a model that shows the real face.")
 @click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px; it is found otherwise.")
@@ -122,6 +123,7 @@ def add(
     emotions: Path | None,
     utterance_id: str | None,
     list_file: Path | None,
+    sound: Path | None,
     face: int | None,
     points: bool,
     box: str | None,
@@ -147,6 +149,7 @@ def add(
     again, only what was given otherwise than before is done anew. FOLDER/import.csv says what was used, what not, and why.
     """
     from facesynth.corpus.add import add as add_recordings
+    from facesynth.corpus.importers.recorder import cut_for
     from facesynth.corpus.record import read_listed
     from facesynth.corpus.workers import Workers
 
@@ -155,20 +158,21 @@ def add(
     where, said = (box, mask) if points or box or mask else None, Said(layout_file, fps, axes)
     corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about), where, face, said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)
-    report = add_recordings(
-        corpus,
-        files,
-        known,
-        listed=read_listed(list_file) if list_file else None,
-        texts=texts,
-        phones=phones,
-        emotions=emotions,
-        face=face,
-        replacing=replacing,
-        workers=workers,
-    )
+    with cut_for(sound, files) as cuts:
+        report = add_recordings(
+            corpus,
+            (*files, *cuts.sounds),
+            known,
+            listed=read_listed(list_file) if list_file else None,
+            texts=texts,
+            phones=phones,
+            emotions=emotions,
+            face=face,
+            replacing=replacing,
+            workers=workers,
+        )
     _keep_videos(corpus, files, report, utterance_id)
-    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *_told(corpus, report)])
+    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_told(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
     _leave_if_nothing(not done, report.refused, "no recording was added")
 

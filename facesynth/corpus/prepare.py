@@ -266,7 +266,7 @@ def _require_emotion(corpus: Corpus, record: Record, recording: Recording) -> No
 def read_motion(corpus: Corpus, recording: Recording, face: int | None) -> tuple[Motion, tuple[str, ...]]:
     """The motion of a recording in its corpus' layout and at its rate, and what was noticed."""
     if recording.motion.suffix.lower() not in VIDEO:
-        return read_into(corpus, recording.motion)
+        return read_into(corpus, recording)
     if is_tracked(corpus.layout):
         from facesynth.corpus.importers.points import motion_from_points
 

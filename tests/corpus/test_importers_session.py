@@ -179,6 +179,7 @@ def test_live_link_with_sound_beside_it_is_speech_and_without_it_eyes_and_blinks
     labels(session / "a.lab", 2.0)
     done = run("corpus", "add", tmp_path / "actor", session, "--jobs", 1)
     assert done.exit_code == 0, done.output
+    assert "b: no speech: there is no sound; kept for eyes and blinks; lay b.wav beside it" in done.output
     corpus = Corpus.open(tmp_path / "actor")
     assert corpus.ids == ("a",)
     assert "kept for eyes and blinks" in corpus.record("b").reason

@@ -4,6 +4,7 @@ import shutil
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from clips import write_video
 from interrupted import contents, killed_and_repeated
 
 from facesynth.capture.kept_tracks import kept_track
@@ -13,6 +14,7 @@ from facesynth.capture.shape import neutral_shape
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
 from facesynth.corpus.add import add
+from facesynth.corpus.importers.recorder import cut_for
 from facesynth.corpus.importers.video import corpus_from_video, motion_from_video
 from facesynth.corpus.recordings import find_recordings
 from facesynth.corpus.transcripts import read_transcripts
@@ -170,3 +172,30 @@ def test_transcripts_by_name(tmp_path):
     table.write_bytes(b"id,text\n\xff\xfe,b\n")
     with pytest.raises(FacesynthError, match="UTF-8"):
         read_transcripts(table)
+
+
+def test_each_clip_finds_its_part_of_a_recorder_that_ran_on(tmp_path):
+    rate = 16000
+    rng = np.random.default_rng(0)
+    long = (rng.standard_normal(30 * rate) * np.repeat(rng.uniform(0.02, 0.5, 200), 30 * rate // 200)).astype(np.float32) * 0.3
+    for name, start_s in (("a", 3.0), ("b", 21.5)):
+        pictures = [np.full((32, 32, 3), 90, np.uint8)] * 100
+        sound = long[int(start_s * rate) : int((start_s + 4) * rate)]
+        write_video(tmp_path / f"{name}.mp4", pictures, sound=sound)
+    other = (rng.standard_normal(4 * rate) * np.repeat(rng.uniform(0.02, 0.5, 20), 4 * rate // 20)).astype(np.float32) * 0.3
+    write_video(tmp_path / "c.mp4", [np.full((32, 32, 3), 90, np.uint8)] * 100, sound=other)
+    save_wav(tmp_path / "recorder.wav", long, rate)
+    with cut_for(tmp_path / "recorder.wav", sorted(tmp_path.glob("*.mp4"))) as cuts:
+        assert [path.name for path in cuts.sounds] == ["a.wav", "b.wav"]
+        for path, start_s in zip(cuts.sounds, (3.0, 21.5), strict=True):
+            part, part_rate = load_audio(path)
+            assert part_rate == rate
+            first = int(start_s * rate)
+            best = min(
+                range(-800, 801, 8), key=lambda lag: float(np.abs(part[1000:20000] - long[first + lag + 1000 :][:19000]).mean())
+            )
+            assert abs(best) / rate < 0.06, "the sound of a video may begin a packet late"
+        assert "c keeps the camera's own sound" in cuts.remarks[0]
+        found, _ = find_recordings([tmp_path / "a.mp4", *cuts.sounds[:1]])
+        assert found[0].sound == cuts.sounds[0]
+    assert not cuts.sounds[0].exists()

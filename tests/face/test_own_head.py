@@ -158,3 +158,33 @@ def test_damaged_heads_are_one_clear_error(tmp_path, trials):
         except FacesynthError:
             refused += 1
     assert refused > trials / 4
+
+
+@pytest.mark.parametrize("trials", [20, pytest.param(500, marks=pytest.mark.slow)])
+def test_damaged_obj_sets_are_one_clear_error(tmp_path, trials):
+    vertices, triangles, shapes = mask()
+    names = ("neutral", "jawOpen", "mouthSmileLeft")
+    folder = tmp_path / "objs"
+    folder.mkdir()
+    for name, shape in zip(names, (np.zeros_like(vertices), *shapes), strict=False):
+        write_obj(folder / f"{name}.obj", vertices + shape, triangles)
+    whole = {name: (folder / f"{name}.obj").read_bytes() for name in names}
+    rng = np.random.default_rng(4)
+    refused = 0
+    for trial in range(trials):
+        name = names[trial % 3]
+        content = bytearray(whole[name][: rng.integers(0, len(whole[name]))] if trial % 2 else whole[name])
+        for place in rng.integers(0, max(len(content), 1), rng.integers(1, 20)) if content else ():
+            content[place] = rng.integers(256)
+        (folder / f"{name}.obj").write_bytes(bytes(content))
+        try:
+            with np.errstate(all="ignore"):
+                own = load_own_head(folder)
+            assert np.isfinite(own.rest_mm).all()
+        except FacesynthError as error:
+            refused += 1
+            assert "\n" not in str(error)
+            assert len(str(error)) < 400
+        (folder / f"{name}.obj").write_bytes(whole[name])
+    assert refused > trials / 4
+    assert load_own_head(folder).names == names[1:]

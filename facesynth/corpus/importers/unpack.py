@@ -31,14 +31,16 @@ QUIET_RATE = 16000
 """Hz of the silence that stands for no sound."""
 
 
-def read_into(corpus: Corpus, path: Path) -> tuple[Motion, tuple[str, ...]]:
+def read_into(corpus: Corpus, recording: Recording) -> tuple[Motion, tuple[str, ...]]:
     """The motion of a recording of any system, in the corpus' layout and at its rate, and what was noticed."""
+    path = recording.motion
     reading = _read(corpus, path)
     try:
         motion, remarks = into_corpus(reading.motion, corpus.layout, corpus.fps)
     except FacesynthError as error:
         raise FacesynthError(f"{path}: {error}") from None
-    return motion, (*reading.remarks, *remarks)
+    silent = (f"{NO_SPEECH}; lay {recording.name}.wav beside it for more",) if _is_silent(recording) else ()
+    return motion, (*silent, *reading.remarks, *remarks)
 
 
 @contextmanager
@@ -69,13 +71,18 @@ def with_unpacked(corpus: Corpus, given: Given, recording: Recording) -> Given:
     Without sound the recording is not usable for speech, and says so; where a sound has come since, it is.
     """
     facts = dict(given.facts)
-    if recording.phones is not None and recording.phones.name == QUIET:
+    if _is_silent(recording):
         facts |= {"usable": False, "reason": NO_SPEECH}
     elif given.id in corpus and corpus.record(given.id).reason == NO_SPEECH:
         facts |= {"usable": True, "reason": ""}
     if recording.text is not None and recording.text != given.recording.text and not facts.get("text"):
         facts["text"] = words_of(recording.text)
     return replace(given, recording=recording, facts=facts)
+
+
+def _is_silent(recording: Recording) -> bool:
+    """Whether an unpacked recording has no sound."""
+    return recording.phones is not None and recording.phones.name == QUIET
 
 
 def _read(corpus: Corpus, path: Path) -> Reading:
