@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.check_swaps import swap_problems
 from facesynth.corpus.journal import node_name
+from facesynth.corpus.limits import MOST_MISSING as HOPELESS
 from facesynth.corpus.problem import Problem
 from facesynth.motion.gaps import missing_in, runs
 from facesynth.motion.motion import Motion
@@ -51,7 +52,10 @@ def _missing(file: str, missing: NDArray[np.bool_], names: NDArray[np.str_]) -> 
         yield Problem(file, f"never seen: {', '.join(names[lost])}", "restore the points, or mark the utterance unusable")
     if missing.mean() > MOST_MISSING:
         yield Problem(
-            file, f"{missing.mean():.0%} of the samples are missing", "fill them where they were tracked, or mark it unusable"
+            file,
+            f"{missing.mean():.0%} of the samples are missing",
+            "fill them where they were tracked, or mark it unusable",
+            grave=bool(missing.mean() > HOPELESS),
         )
 
 

@@ -1,3 +1,4 @@
+import csv
 import shutil
 
 import numpy as np
@@ -7,9 +8,11 @@ from corpora import EMOTIONS, tiny_layout, tiny_utterances
 from facesynth.corpus import Corpus
 from facesynth.corpus.add import add, find_recordings
 from facesynth.corpus.align import align
+from facesynth.corpus.check import check
+from facesynth.corpus.transcripts import read_transcripts
 from facesynth.errors import FacesynthError
 from facesynth.motion.pose import apply_head, rigid_points
-from facesynth.speech.audio import save_wav
+from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_label_lines, write_textgrid
 
 NEUTRAL = np.reshape(tiny_layout().neutral, (-1, 3))
@@ -194,3 +197,129 @@ def test_what_fits_one_recording_is_refused_for_many(session, tmp_path):
         add(new_corpus(tmp_path / "c"), [session], {"text": "hello"})
     with pytest.raises(FacesynthError, match="no such file"):
         add(new_corpus(tmp_path / "d"), [tmp_path / "nowhere"])
+
+
+def test_motion_that_lasts_otherwise_than_the_sound_is_told_or_refused(session, tmp_path):
+    with np.load(session / "s00_happy_t1.npz") as stored:
+        np.savez(session / "s00_happy_t1.npz", frames=stored["frames"][:-40], fps=120.0)
+    with np.load(session / "s00_neutral_t1.npz") as stored:
+        np.savez(session / "s00_neutral_t1.npz", frames=stored["frames"][: len(stored["frames"]) // 3], fps=120.0)
+    report = add(new_corpus(tmp_path / "c"), [session])
+    assert any("do they begin together?" in remark for remark in report.remarks["s00_happy_t1"])
+    assert "are they of one recording" in report.refused["s00_neutral_t1"]
+    assert report.added == ("s00_happy_t1", "s00_neutral_t2")
+
+
+@pytest.mark.parametrize(("share", "is_used"), [(0.4, True), (0.6, False)])
+def test_what_is_added_with_gaps_is_not_grave_for_the_check(session, tmp_path, share, is_used):
+    for path in session.glob("*.npz"):
+        with np.load(path) as stored:
+            frames = stored["frames"].copy()
+        frames[np.arange(len(frames)) % 100 < 100 * share] = np.nan
+        np.savez(path, frames=frames, fps=120.0, head=np.zeros((len(frames), 6)))
+    corpus = new_corpus(tmp_path / "c")
+    report = add(corpus, [session])
+    assert bool(report.added) == is_used
+    if is_used:
+        missing = [problem for problem in check(corpus) if "samples are missing" in problem.what]
+        assert missing
+        assert not any(problem.grave for problem in missing)
+    else:
+        assert "% of the motion's samples are missing" in report.refused["s00_happy_t1"]
+
+
+def test_a_table_among_the_clips_says_what_is_said(session, tmp_path):
+    for path in session.glob("*.txt"):
+        path.unlink()
+    table = session / "lines.csv"
+    table.write_text("id,text\ns00_happy_t1.wav,good day\ns00_neutral_t1,so so\nnobody,never\n", encoding="utf-8")
+    corpus = new_corpus(tmp_path / "c")
+    report = add(corpus, [session])
+    assert report.refused == {}
+    assert [record.text for record in corpus.records] == ["good day", "so so", ""]
+    assert report.remarks["lines.csv"] == ("says what is said in 2 recordings", "names 1 that are not here: nobody")
+    other = new_corpus(tmp_path / "d")
+    report = add(other, [session], texts={"s00_happy_t1": "other words"})
+    assert other.record("s00_happy_t1").text == "other words"
+    assert "came with --text-file" in report.refused["lines.csv"]
+    assert add(new_corpus(tmp_path / "e"), [session], texts=read_transcripts(table)).refused == {}, "it is the same table"
+
+
+def test_a_list_among_the_clips_is_passed_over_with_words(session, tmp_path):
+    (session / "list.csv").write_text("id,emotion\ns00_happy_t1,happy\n", encoding="utf-8")
+    report = add(new_corpus(tmp_path / "c"), [session])
+    assert len(report.added) == 3
+    assert "--list" in report.refused["list.csv"]
+
+
+def test_the_account_says_what_was_used_and_what_not(session, tmp_path):
+    (session / "s00_happy_t1.npz").write_bytes(b"damaged")
+    corpus = new_corpus(tmp_path / "c")
+    add(corpus, [session])
+    with open(corpus.path / "import.csv", encoding="utf-8", newline="") as file:
+        rows = {row["recording"]: row for row in csv.DictReader(file)}
+    assert {name: row["used"] for name, row in rows.items()} == {
+        "s00_happy_t1": "no",
+        "s00_neutral_t1": "yes",
+        "s00_neutral_t2": "yes",
+    }
+    assert rows["s00_happy_t1"]["why"].startswith("s00_happy_t1.npz is no")
+    assert str(tmp_path) not in (corpus.path / "import.csv").read_text(encoding="utf-8"), "places of files are nobody's business"
+    used = rows["s00_neutral_t2"]
+    assert used["phones"] == "given"
+    wanted = ["wav", "npz", "TextGrid", "txt"]
+    assert used["files"] == "; ".join(f"Tag 1/s00_neutral_t2.{suffix}" for suffix in wanted)
+
+
+def test_an_account_outlives_other_imports_and_damage(session, tmp_path):
+    corpus = new_corpus(tmp_path / "c")
+    (session / "s00_happy_t1.npz").unlink()
+    add(corpus, [session])
+    before = (corpus.path / "import.csv").read_bytes()
+    one = [session / f"s00_neutral_t2.{suffix}" for suffix in ("wav", "npz", "TextGrid", "txt")]
+    add(corpus, one)
+    assert (corpus.path / "import.csv").read_bytes() == before
+    (corpus.path / "import.csv").write_bytes(b"\xff\x00garbage")
+    add(corpus, [session])
+    assert (corpus.path / "import.csv").read_bytes() == before
+
+
+def test_a_fault_of_the_program_ends_one_recording_alone(session, tmp_path, monkeypatch):
+    from facesynth.corpus import prepare
+
+    real = prepare.read_motion
+
+    def failing(corpus, recording, face):
+        if recording.name == "s00_happy_t1":
+            raise ZeroDivisionError("of all things")
+        return real(corpus, recording, face)
+
+    monkeypatch.setattr(prepare, "read_motion", failing)
+    report = add(new_corpus(tmp_path / "c"), [session])
+    assert len(report.added) == 2
+    assert "ZeroDivisionError" in report.refused["s00_happy_t1"]
+    assert prepare.FAULT in report.refused["s00_happy_t1"]
+
+
+def test_aligning_a_corpus_gives_what_adding_gave(recordings, tmp_path):
+    """What is heard is what is kept: sixteen bits, so that aligning later gives the same to the byte."""
+    folder = tmp_path / "session"
+    folder.mkdir()
+    words = {"01": "Kids are talking by the door.", "02": "Dogs are sitting by the door."}
+    for sound in sorted(recordings("ravdess_speech").rglob("03-01-0[15]-01-0?-01-01.flac")):
+        audio, rate = load_audio(sound)
+        save_float_wav(folder / f"{sound.stem}.wav", 1.7 * audio / np.abs(audio).max(), rate)
+        count = round(len(audio) / rate * 120)
+        np.savez(folder / f"{sound.stem}.npz", frames=np.tile(NEUTRAL, (count, 1, 1)), head=np.zeros((count, 6)))
+        (folder / f"{sound.stem}.txt").write_text(words[sound.stem.split("-")[4]], encoding="utf-8")
+    corpus = new_corpus(tmp_path / "c")
+    assert len(add(corpus, [folder]).added) == 4
+    before = contents(corpus.path)
+    assert len(align(corpus).aligned) == 4
+    assert contents(corpus.path) == before
+
+
+def save_float_wav(path, audio, rate):
+    import soundfile
+
+    soundfile.write(path, audio, rate, subtype="FLOAT")
