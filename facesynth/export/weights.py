@@ -15,7 +15,7 @@ from facesynth.export.folder import Content
 
 Weights = Literal["float32", "float16", "int8"]
 LARGE = 1024
-"""Constants of fewer numbers stay as they are."""
+"""Constants of fewer numbers stay as they are, and so do vectors: one of 8 bits would shift the face."""
 SMALLER_ARRAYS = ("node_frames", "frames", "features")
 """Arrays of a database that may be kept in fewer bits."""
 
@@ -46,7 +46,7 @@ def _smaller(model: onnx.ModelProto, weights: Weights) -> onnx.ModelProto:
     widening: list[onnx.NodeProto] = []
     for tensor in model.graph.initializer:
         array: NDArray[Any] = numpy_helper.to_array(tensor)
-        if array.size < LARGE or array.dtype.kind != "f":
+        if array.size < LARGE or array.ndim < 2 or array.dtype.kind != "f":
             kept.append(tensor)
             continue
         kind = tensor.data_type
