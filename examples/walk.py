@@ -1,4 +1,5 @@
-"""One complete walk: clips of a talker → corpus → check → training → a sentence that was not learned from → video.
+"""One complete walk: clips of a talker → corpus → check → training → a sentence that was not learned from → video,
+and that video beside the real one.
 
     python examples/walk.py path/to/grid_s26 walk/
 
@@ -16,6 +17,7 @@ import sys
 from pathlib import Path
 
 from grid import sentence
+from side_by_side import side_by_side
 
 SUFFIXES = (".mpg", ".mp4", ".mov", ".mkv")
 
@@ -37,8 +39,10 @@ def main(clips: Path, folder: Path) -> None:
     facesynth("corpus", "stats", actor, "--pictures", folder / "pictures")
     facesynth("train", "efase", actor, "-o", model)
     text = texts[left_out.stem]
-    outputs = [part for name in ("said.mp4", "said.csv", "said.glb") for part in ("-o", folder / name)]
+    outputs = [part for name in ("said.mp4", "said.csv", "said.glb", "said.npz") for part in ("-o", folder / name)]
     facesynth("speak", model, left_out, "--text", text, "--fps", 25, "--size", "640x640", *outputs)
+    beside, plate = side_by_side(left_out, folder / "said.mp4", folder / "said.npz", actor, folder)
+    print(f"{beside}: the real clip beside the head; {plate}: pictures of both, and how far their lips are open")
     print(f"{left_out.name} says “{text}”; so does {folder / 'said.mp4'}, on the built-in head, without having learned from it")
 
 
