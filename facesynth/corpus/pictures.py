@@ -34,14 +34,16 @@ def draw_all(corpus: Corpus, folder: str | Path) -> tuple[Path, ...]:
 def draw(utterance: Utterance, path: str | Path) -> None:
     """Draw one recording as PNG: sound above, phones in the middle (p, b and m in red), opening of the mouth below."""
     try:
-        from PIL import Image, ImageDraw, ImageFont
+        from PIL import Image, ImageDraw
+
+        from facesynth.corpus.lettering import font_for, legible
     except ImportError:
         raise FacesynthError("pictures need the package pillow; install `facesynth[head]`") from None
     width = round(utterance.speech.duration_s * WIDTH_PER_S) + 2 * MARGIN
     image = Image.new("RGB", (max(width, 320), WAVE + LABELS + MOUTH + 4 * MARGIN + 16), "white")
-    pen, font = ImageDraw.Draw(image), ImageFont.load_default(13)
-    title = f"{utterance.id}   {utterance.emotion}   {utterance.speech.text}"
-    pen.text((MARGIN, 2), title, fill=INK, font=font)
+    title = " ".join(f"{utterance.id}   {utterance.emotion}   {utterance.speech.text}".split("\n"))
+    pen, font = ImageDraw.Draw(image), font_for("")
+    pen.text((MARGIN, 2), legible(title, font_for(title)), fill=INK, font=font_for(title))
     top = 16 + MARGIN
     bottom = image.height - MARGIN
     ends = [0.0, *utterance.speech.phones.ends_s.tolist()]

@@ -236,6 +236,20 @@ def test_sound_that_is_shifted_in_one_recording_is_found(tmp_path):
     assert "after the sound" in problem.what
 
 
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_sound_that_is_shifted_is_found_in_few_recordings_too(tmp_path, count):
+    corpus = tiny_corpus(tmp_path / "c", utterances=count)
+    (note,) = [problem for problem in check_all(corpus) if problem.file == "audio"]
+    assert not note.grave
+    assert f"{count} recording{'s are' if count > 1 else ' is'} too few to find" in note.what
+    shifted(corpus, corpus.ids, 0.4)
+    found = [problem for problem in check_all(corpus) if problem.file == "audio"]
+    assert [problem.grave for problem in found] == [True, False]
+    assert abs(int(found[0].what.split(" moves ")[1].split(" ms")[0]) - 400) <= 60
+    assert "before the sound" in found[0].what
+    assert "too few" in found[1].what
+
+
 def test_a_copy_that_is_not_the_same_to_the_byte_is_found(corpus):
     text = corpus.files.header.read_text(encoding="utf-8")
     corpus.files.header.write_text(text.replace("synthetic: true", "synthetic: false"), encoding="utf-8")
