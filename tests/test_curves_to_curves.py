@@ -39,16 +39,11 @@ def model(tmp_path_factory):
         lower = motion.points[:, list(motion.layout.names).index("lip_lower"), 1]
         opening = (lower.max() - lower) / 6
         weights = np.stack([opening, 0.5 + 0.4 * np.sin(opening), 0 * opening + 0.1], axis=1)
-        np.savez(takes / f"{record.id}.npz", weights=weights.astype(np.float32), fps=60.0)
+        np.savez(takes / f"{record.id}.npz", weights=weights[:: round(motion.fps / 60)].astype(np.float32), fps=60.0)
         save_wav(takes / f"{record.id}.wav", speech.audio, speech.sample_rate)
         write_textgrid(takes / f"{record.id}.TextGrid", speech.phones, ())
     (takes / "channels.txt").write_text("\n".join(NAMES), encoding="utf-8")
-    run("corpus", "convert", takes, "-o", folder / "plain")
-    layout = folder / "plain" / "layout.yaml"
-    run("corpus", "new", folder / "actor", "--performer", "A", "--layout", layout, "--fps", 60)
-    sounds = [path for path in takes.iterdir() if path.suffix in (".wav", ".TextGrid")]
-    motions = sorted((folder / "plain").glob("*.npz"))
-    assert "added 12" in run("corpus", "add", folder / "actor", *sounds, *motions, "--jobs", 1)
+    assert "added 12" in run("corpus", "add", folder / "actor", takes, "--jobs", 1)
     run("train", "efase", folder / "actor", "-o", folder / "model.safetensors")
     return folder
 
@@ -115,11 +110,9 @@ def test_a_head_of_ones_own_speaks(model, tmp_path, rig_or_skip):
 
 
 def take(count=130):
+    """A take whose eyes look each their own way and roll, as the app's do."""
     rng = np.random.default_rng(0)
-    values = np.concatenate([rng.random((count, 52)), rng.normal(0, 0.2, (count, 9))], axis=1).astype(np.float32)
-    values[:, 58:] = values[:, 55:58]  # both eyes look alike, as in what facesynth writes
-    values[:, [57, 60]] = 0.0
-    return values
+    return np.concatenate([rng.random((count, 52)), rng.normal(0, 0.2, (count, 9))], axis=1).astype(np.float32)
 
 
 def test_our_own_live_link_comes_back_exactly(tmp_path):
@@ -136,45 +129,56 @@ def test_our_own_live_link_comes_back_exactly(tmp_path):
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
     motion = read_livelink_motion(tmp_path / "a.csv").motion
     assert motion.fps == 60
-    np.testing.assert_allclose(motion.frames, values[:, :52], atol=1e-10, err_msg="ten decimals are what the format keeps")
-    assert gaze_of(motion.frames).shape == (len(values), 2)
-    back = take_of(FaceAnimation(ARKIT_NAMES, motion.frames, motion.head, motion.eyes[:, 1:], np.zeros(len(values)), 60))
+    np.testing.assert_allclose(
+        motion.frames[:, :52], values[:, :52], atol=1e-10, err_msg="ten decimals are what the format keeps"
+    )
+    np.testing.assert_allclose(motion.frames[:, 52:], values[:, 55:], atol=1e-7, err_msg="both eyes, with their rolls")
+    weights = motion.frames[:, :52]
+    assert gaze_of(weights).shape == (len(values), 2)
+    back = take_of(FaceAnimation(ARKIT_NAMES, weights, motion.head, motion.eyes[:, 1:], np.zeros(len(values)), 60), motion)
     assert back.timecodes == first.timecodes
     np.testing.assert_allclose(back.values[:, :52], values[:, :52], atol=1e-10)
     np.testing.assert_allclose(back.values[:, 52:], values[:, 52:], atol=2e-7)
 
 
 def test_real_live_link_takes_come_back_to_the_byte_and_teach_eyes_but_no_speech(recordings, tmp_path):
-    from facesynth.corpus.importers.convert import convert, read
+    from facesynth.corpus.importers.convert import convert
+    from facesynth.corpus.importers.formats import read
 
     for path in sorted(recordings("livelink").glob("*.csv")):
         there = read_livelink(path)
         write_livelink(tmp_path / path.name, there)
         assert (tmp_path / path.name).read_text(encoding="utf-8") == path.read_text(encoding="utf-8").replace("\r\n", "\n")
         motion = read(path).motion
-        np.testing.assert_allclose(motion.frames, np.clip(there.values[:, :52], 0, 1), atol=1e-7)
+        np.testing.assert_allclose(motion.frames[:, :52], np.clip(there.values[:, :52], 0, 1), atol=1e-7)
+        np.testing.assert_allclose(motion.frames[:, 52:], there.values[:, 55:], atol=1e-7)
     report = convert([recordings("livelink")], tmp_path / "plain")
     assert len(report.converted) == 4
     shut = [read(path).motion.eyes[:, 0].min() for path in sorted(recordings("livelink").glob("*.csv"))]
     assert min(shut) < 0.5, "somebody blinks"
-    layout = tmp_path / "plain" / "layout.yaml"
-    run("corpus", "new", tmp_path / "c", "--performer", "A", "--layout", layout, "--fps", 60)
-    refused = CliRunner().invoke(cli, ["corpus", "add", str(tmp_path / "c"), *map(str, (tmp_path / "plain").glob("*.npz"))])
-    assert "motion without sound teaches no speech" in str(refused.exception)
+    run("corpus", "add", tmp_path / "c", recordings("livelink"), "--jobs", 1)
+    corpus = Corpus.open(tmp_path / "c")
+    assert (len(corpus.records), len(corpus)) == (4, 0)
+    assert all("no sound" in record.reason for record in corpus.records)
+    told = json.loads(run("corpus", "stats", tmp_path / "c", "--add", 0, "--json"))["eyes"]
+    assert (told["recordings"], told["silent"]) == (4, 4)
+    assert told["blinks"] > 15
+    assert 30 < told["blink_ms"] < 400, "the time for which an eye is more than half shut"
+    assert 0.5 < told["gaze_deg"][0] < 20
+    refused = CliRunner().invoke(cli, ["train", "efase", str(tmp_path / "c"), "-o", str(tmp_path / "m.safetensors")])
+    assert "there is no sound" in str(refused.exception)
 
 
 @pytest.mark.slow
-def test_facegood_comes_in_and_out_as_curves(recordings, tmp_path):
+@pytest.mark.parametrize("method", ["ridge", "efase"])
+def test_facegood_comes_in_and_out_as_curves(recordings, tmp_path, method):
     """Mandarin, 116 curves, no transcript: phones by ear, a model, and curves of a take that it did not see."""
     source = recordings("facegood")
-    run("corpus", "convert", source, "-o", tmp_path / "plain")
-    run("corpus", "new", tmp_path / "c", "--performer", "F", "--layout", tmp_path / "plain" / "layout.yaml", "--fps", 30)
-    out = run("corpus", "add", tmp_path / "c", *source.glob("*.wav"), *(tmp_path / "plain").glob("*.npz"), "--jobs", 1, "--json")
-    added = json.loads(out)["added"]
+    added = json.loads(run("corpus", "add", tmp_path / "c", source, "--jobs", 1, "--json"))["added"]
     assert len(added) == 4
     corpus = Corpus.open(tmp_path / "c")
     corpus.update(type(corpus.records[0])(**{**corpus.record(added[0]).__dict__, "split": "test"}))
-    run("train", "ridge", tmp_path / "c", "--split", "train", "-o", tmp_path / "m.safetensors")
+    run("train", method, tmp_path / "c", "--split", "train", "-o", tmp_path / "m.safetensors")
     run("speak", tmp_path / "m.safetensors", source / f"{added[0]}.wav", "-o", tmp_path / "o.csv")
     told, _ = load_motion(tmp_path / "o.csv", corpus.layout, 30)
     truth = corpus[added[0]].motion
@@ -185,17 +189,27 @@ def test_facegood_comes_in_and_out_as_curves(recordings, tmp_path):
     assert np.corrcoef(told.frames[:count, jaw], truth.frames[:count, jaw])[0, 1] > 0.6
 
 
+@pytest.mark.slow
 def test_beat2_gives_head_and_eyes_with_speech(recordings, tmp_path):
-    source = recordings("beat2_scott")
-    run("corpus", "convert", source, "-o", tmp_path / "plain")
-    run("corpus", "new", tmp_path / "c", "--performer", "S", "--layout", tmp_path / "plain" / "layout.yaml", "--fps", 30)
-    sound = next(path for path in source.iterdir() if path.suffix in (".wav", ".flac"))
-    (motion,) = (tmp_path / "plain").glob("*.npz")
-    (tmp_path / "one.lab").write_text("1.0 pau\n2.0 aa\n45.0 pau\n", encoding="utf-8")
-    run("corpus", "add", tmp_path / "c", sound, motion, "--phones", tmp_path / "one.lab", "--jobs", 1)
+    """Phones by ear go with what is seen: the jaw opens in vowels, the head turns more where somebody speaks."""
+    run("corpus", "add", tmp_path / "c", recordings("beat2_scott"), "--jobs", 1)
     utterance = next(iter(Corpus.open(tmp_path / "c")))
-    assert utterance.motion.duration_s == pytest.approx(45, abs=0.2)
-    assert np.isfinite(utterance.motion.head).all()
-    assert np.ptp(utterance.motion.head[:, :3], axis=0).max() > 0.1, "the head turns"
-    assert np.ptp(utterance.motion.eyes[:, 1:], axis=0).max() > 0.03, "the eyes move"
-    assert utterance.speech.audio.std() > 0.001
+    motion, phones = utterance.motion, utterance.speech.phones
+    assert motion.duration_s == pytest.approx(45, abs=0.2)
+    assert len(phones) > 150, "45 s of talk"
+    jaw = motion.frames[:, 0]
+    bounds = phones.frame_bounds(motion.fps)
+    spans = list(zip(phones.labels, bounds[:-1], bounds[1:], strict=True))
+    wide, shut = (
+        np.concatenate([jaw[first:stop] for label, first, stop in spans if label in labels])
+        for labels in (("aa", "ae", "ah", "ay", "ao", "aw"), ("pau", "p", "b", "m"))
+    )
+    assert np.median(wide) > 1.3 * np.median(shut)
+    assert np.isfinite(motion.head).all()
+    turning = np.abs(np.diff(motion.head[:, :3], axis=0)).sum(axis=1)
+    silent = np.concatenate([np.arange(first, stop) for label, first, stop in spans if label == "pau"])
+    speaking = np.setdiff1d(np.arange(len(turning)), silent)
+    assert np.ptp(motion.head[:, :3], axis=0).max() > 0.1, "the head turns"
+    assert turning[speaking].mean() > turning[silent[silent < len(turning)]].mean(), "more while speaking"
+    assert np.ptp(motion.eyes[:, 1:], axis=0).max() > 0.03, "the eyes move"
+    assert json.loads(run("corpus", "stats", tmp_path / "c", "--add", 0, "--json"))["eyes"]["recordings"] == 1

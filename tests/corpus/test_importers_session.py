@@ -355,3 +355,26 @@ def test_damaged_files_are_told_and_the_rest_added(tmp_path):
 def test_five_hundred_damaged_files_of_each_kind_through_add(tmp_path):
     with np.errstate(all="ignore"):
         fuzz_add(tmp_path, 500)
+
+
+def test_seven_sensors_at_250_hz_from_arrays_of_other_names(tmp_path):
+    session = tmp_path / "session"
+    session.mkdir()
+    names = ("TD", "TB", "TT", "UL", "LL", "JAW", "NOSE")
+    opening = 5 + 5 * np.sin(np.arange(500) / 12)
+    points = np.tile(np.arange(21.0).reshape(7, 3), (500, 1, 1))
+    points[:, 4, 1] -= opening
+    np.savez(session / "a.npz", positions=points.transpose(1, 2, 0) / 10, samplerate=250)
+    save_wav(session / "a.wav", talk(2.0), 16000)
+    labels(session / "a.lab", 2.0)
+    (session / "layout.yaml").write_text(
+        f"kind: markers\nnames: [{', '.join(names)}]\nlip_pairs: [[UL, LL]]\nfiles: {{unit: cm, order: 'points,axes,time'}}\n"
+    )
+    done = run("corpus", "add", tmp_path / "actor", session, "--jobs", 1)
+    assert done.exit_code == 0, done.output
+    corpus = Corpus.open(tmp_path / "actor")
+    assert corpus.fps == 250
+    motion = corpus["a"].motion
+    assert motion.layout.names == names
+    assert motion.layout.groups["tongue"] == (0, 1, 2)
+    np.testing.assert_allclose(lip_gap(motion) - lip_gap(motion).min(), opening - opening.min(), atol=1e-4)
