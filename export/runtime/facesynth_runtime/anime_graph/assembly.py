@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth_runtime.anime_graph.graph import Candidates, Nodes, Wish
-from facesynth_runtime.anime_graph.hearing import Floats, warp_path
+from facesynth_runtime.anime_graph.hearing import Floats, Ints, warp_path, warp_paths
 from facesynth_runtime.filters import gaussian, time_warp
 
 VELOCITY_LASTS_S = 0.04
@@ -34,14 +34,28 @@ def make_piece(nodes: Nodes, wish: Wish, candidates: Candidates, chosen: int) ->
     return Piece(wish.emotion, node, number, wish.wanted, motion)
 
 
-def warped(motion: Floats, wanted: Floats, heard: Floats, count: int) -> Floats:
-    """Motion [L, D] that sounded like heard [L', P], brought to `count` frames of speech like wanted [m, P]."""
+def likely_motions(nodes: Nodes, wish: Wish, candidates: Candidates, likely: Ints) -> Floats:
+    """[n, frames, D] some candidates of a phone, time-warped to it."""
+    chosen = candidates.nodes[likely].tolist()
+    heard = [nodes.audio(node) for node in chosen]
+    motions = [nodes.motion(node, number) for node, number in zip(chosen, candidates.maps[likely].tolist(), strict=True)]
+    together = wish.frames > 1 and len(wish.wanted) > 1
+    paths = warp_paths(wish.wanted, heard) if together else [None] * len(heard)
+    each = zip(motions, heard, paths, strict=True)
+    return np.stack([warped(motion, wish.wanted, sound, wish.frames, path) for motion, sound, path in each])
+
+
+def warped(motion: Floats, wanted: Floats, heard: Floats, count: int, path: Floats | None = None) -> Floats:
+    """Motion [L, D] that sounded like heard [L', P], brought to `count` frames of speech like wanted [m, P].
+
+    path: where warping matches them, if that is known.
+    """
     if count == 0:
         return motion[:0]
     if count == 1 or len(wanted) < 2 or len(heard) < 2:
         return time_warp(motion, count)
     even = np.linspace(0, 1, len(wanted))
-    path = warp_path(wanted, heard) / (len(heard) - 1)
+    path = (warp_path(wanted, heard) if path is None else path) / (len(heard) - 1)
     path[0], path[-1] = 0.0, 1.0
     departure = path - even
     margin = min(len(departure) - 1, round(4 * WARP_SMOOTHING))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -74,6 +76,14 @@ def warp_path(wanted: Floats, heard: Floats) -> Floats:
     """[m] the place in heard [L, P], in frames, that warping matches with each frame of wanted [m, P]."""
     first, last = _matches(wanted, heard[None], np.array([len(heard)]))
     return (first[:, 0] + last[:, 0]) / 2
+
+
+def warp_paths(wanted: Floats, heard: Sequence[Floats]) -> list[Floats]:
+    """The same for several candidates [L, P] at once."""
+    lengths = np.array([len(frames) for frames in heard])
+    padded = np.stack([frames[np.minimum(np.arange(lengths.max()), len(frames) - 1)] for frames in heard])
+    first, last = _matches(wanted, padded, lengths)
+    return list(((first + last) / 2).T)
 
 
 def _costs(wanted: Floats, features: Floats, starts: Ints, lengths: Ints) -> Floats:

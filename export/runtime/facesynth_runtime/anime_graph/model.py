@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from facesynth_runtime.anime_graph.assembly import Blender, make_piece
+from facesynth_runtime.anime_graph.assembly import Blender, likely_motions, make_piece
 from facesynth_runtime.anime_graph.closure import close_at, keep_shut
 from facesynth_runtime.anime_graph.graph import Candidates, LookAhead, Nodes, Step, Weights, Wish, best_path, soft_path
 from facesynth_runtime.anime_graph.hearing import Ear, Floats, Ints
@@ -231,7 +231,7 @@ class AnimeGraph:
             plan.wishes, plan.candidates, soft_path(plan.steps, self.weights, self.settings["temperature"]), strict=True
         ):
             likely = np.flatnonzero(shares >= min(LEAST_SHARE, shares.max()))
-            pieces = np.stack([make_piece(self.nodes, wish, candidates, int(i)).motion for i in likely])
+            pieces = likely_motions(self.nodes, wish, candidates, likely)
             frames.append(np.tensordot(shares[likely] / shares[likely].sum(), pieces, 1))
         return np.concatenate(frames)
 
