@@ -55,11 +55,18 @@ def _killed(command, after_s):
         family = descendants(process.pid)
         process.kill()
         process.wait()
-    patience = time.monotonic() + LEFT_S
-    while left := [pid for pid, born in family.items() if _born(pid) == born]:
-        assert time.monotonic() < patience, f"{len(left)} processes of a killed import are left"
-        time.sleep(0.1)
+    assert not left_after(family, LEFT_S), "processes of a killed import are left"
     return True
+
+
+def left_after(family, seconds):
+    """Which of some processes, as `descendants` gives them, are still there after so many seconds."""
+    patience = time.monotonic() + seconds
+    while (
+        left := [pid for pid, born in family.items() if born is not None and _born(pid) == born]
+    ) and time.monotonic() < patience:
+        time.sleep(0.1)
+    return left
 
 
 def descendants(pid):

@@ -15,6 +15,7 @@ from facesynth.errors import FacesynthError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from facesynth.corpus.workers import Workers
     from facesynth.methods.emotion.detector import EmotionDetector
 
 
@@ -116,10 +117,13 @@ def _show(facts: dict[str, Any]) -> None:
         start = row["end_s"]
 
 
-def train_detector(source: Path, config: Mapping[str, Any], output: Path, split_seed: int | None, *, as_json: bool) -> None:
+def train_detector(
+    source: Path, config: Mapping[str, Any], output: Path, split_seed: int | None, *, workers: Workers, as_json: bool
+) -> None:
     """`facesynth train emotion`: learn from a corpus, or from a list of sound files, and write a detector.
 
-    split_seed: learn from the training sentences of that split of a corpus; None: from everything.
+    split_seed: learn from the training sentences of that split of a corpus; None: from everything. workers: who extracts
+    the features of the voices.
     """
     from facesynth.corpus import Corpus
     from facesynth.methods.emotion.clips import clips_of_corpus, clips_of_list
@@ -133,7 +137,7 @@ def train_detector(source: Path, config: Mapping[str, Any], output: Path, split_
     else:
         clips = clips_of_list(source)
         detector.provenance = {"recordings": source.name, "clips": len(clips)}
-    detector.fit(clips).save(output)
+    detector.fit(clips, workers).save(output)
     facts = {"model": str(output), "method": "emotion", "recordings": len(clips), "emotions": list(detector.emotions)}
     if as_json:
         click.echo(json.dumps(facts))

@@ -11,7 +11,10 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import redirect_stdout
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 from facesynth.errors import FacesynthError, unknown
 from facesynth.progress import track
@@ -55,11 +58,18 @@ def spread(function: Callable[[Item], Result], items: Sequence[Item], workers: W
     Where a worker dies, what it had not finished is done again by new ones. FacesynthError where that does not help;
     results until then were yielded.
     """
+    work = partial(_in_one_thread, function)
     if workers.engine == "ray" and len(items):
-        return track(_quietly(_on_ray(function, items, workers)), what, len(items))
+        return track(_quietly(_on_ray(work, items, workers)), what, len(items))
     if workers.jobs == 1 or len(items) < 2:
-        return track(map(function, items), what, len(items))
-    return track(_persistent(function, items, workers.jobs), what, len(items))
+        return track(map(work, items), what, len(items))
+    return track(_persistent(work, items, workers.jobs), what, len(items))
+
+
+def _in_one_thread(function: Callable[[Item], Result], item: Item) -> Result:
+    """Sums over several threads are rounded otherwise than in one: the result must not depend on who has how many."""
+    with threadpool_limits(1):
+        return function(item)
 
 
 def _persistent(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:

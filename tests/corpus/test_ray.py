@@ -1,6 +1,9 @@
 """Two Ray workers; in a process of their own, for Ray leaves threads and warnings behind."""
 
 import importlib.util
+import json
+import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -8,10 +11,12 @@ import textwrap
 import numpy as np
 import pytest
 from corpora import tiny_layout, tiny_utterances
-from interrupted import contents
+from interrupted import lasting
 
+from facesynth.capture.models import MODELS, _kept
 from facesynth.corpus import Corpus
-from facesynth.speech.audio import save_wav
+from facesynth.corpus.add import add
+from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_textgrid
 
 pytestmark = pytest.mark.skipif(
@@ -19,13 +24,14 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def python(code, *arguments):
+def python(code, *arguments, **environment):
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=240,
         check=False,
+        env={**os.environ, **environment},
     )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
@@ -35,7 +41,20 @@ def new(folder):
     return Corpus.create(folder, performer="A", layout=tiny_layout(), fps=120, emotions=["neutral"]).path
 
 
+def spoken(folder, recordings):
+    """Two real recordings with their words, and motion that stands still."""
+    folder.mkdir()
+    for name, words in (("01", "Kids are talking by the door."), ("02", "Dogs are sitting by the door.")):
+        audio, rate = load_audio(min(recordings("ravdess_speech").rglob(f"03-01-01-01-{name}-01-01.flac")))
+        save_wav(folder / f"{name}.wav", audio, rate)
+        (folder / f"{name}.txt").write_text(words, encoding="utf-8")
+        frames = np.tile(np.array(tiny_layout().neutral, np.float32), (round(len(audio) / rate * 120), 1))
+        np.savez(folder / f"{name}.npz", frames=frames, head=np.zeros((len(frames), 6)), fps=120.0)
+    return folder
+
+
 def test_two_ray_workers_give_the_same_bytes_as_one_process_and_a_dead_one_is_replaced(tmp_path):
+    """The worker that holds the fourth recording dies in the middle of the import."""
     session = tmp_path / "session"
     session.mkdir()
     for record, speech, motion in tiny_utterances(6):
@@ -44,35 +63,79 @@ def test_two_ray_workers_give_the_same_bytes_as_one_process_and_a_dead_one_is_re
         np.savez(session / f"{record.id}.npz", frames=motion.frames, fps=motion.fps, head=motion.head)
     (session / "hurt.wav").write_bytes(b"RIFF")
     (session / "hurt.npz").write_bytes(b"PK")
+    alone = add(Corpus.open(new(tmp_path / "alone")), [session])
     out = python(
         """
-        import os, sys
-        from functools import partial
+        import json, os, sys
         from pathlib import Path
+        import facesynth.corpus.add as adding
         from facesynth.corpus import Corpus
-        from facesynth.corpus.add import add
-        from facesynth.corpus.workers import Workers, spread
+        from facesynth.corpus.workers import Workers
 
-        alone = add(Corpus.open(sys.argv[1]), [sys.argv[3]])
-        rays = add(Corpus.open(sys.argv[2]), [sys.argv[3]], workers=Workers(2, "ray"))
-        assert (alone.added, set(alone.refused)) == (rays.added, set(rays.refused)), (alone, rays)
-        print(len(rays.added), *rays.refused)
+        attempt = adding.attempt
 
-        def negative(number, marker):
-            if number == 3 and not Path(marker).exists():
+        def dying(task, name=sys.argv[4], marker=sys.argv[3]):
+            if task[1].id == name and not Path(marker).exists():
                 Path(marker).touch()
                 os._exit(9)
-            return -number
+            return attempt(task)
 
-        print(list(spread(partial(negative, marker=sys.argv[4]), range(8), Workers(2, "ray"), "negating")))
+        adding.attempt = dying
+        report = adding.add(Corpus.open(sys.argv[1]), [sys.argv[2]], workers=Workers(2, "ray"))
+        print(json.dumps([report.added, sorted(report.refused)]))
         """,
-        new(tmp_path / "alone"),
         new(tmp_path / "rays"),
         session,
         tmp_path / "marker",
+        tiny_utterances(6)[3][0].id,
     )
-    assert tuple(out.splitlines()) == ("6 hurt", str([-n for n in range(8)]))
-    assert (tmp_path / "marker").exists()
-    alone, rays = contents(tmp_path / "alone"), contents(tmp_path / "rays")
-    assert {name for name in alone if name[0] != "."} == {name for name in rays if name[0] != "."}
-    assert all(alone[name] == rays[name] for name in alone)
+    assert json.loads(out) == [list(alone.added), ["hurt"]]
+    assert (tmp_path / "marker").exists(), "a worker died"
+    assert lasting(tmp_path / "rays") == lasting(tmp_path / "alone")
+
+
+def test_alignment_and_features_of_voices_are_the_same_over_ray(recordings, tmp_path):
+    session = spoken(tmp_path / "session", recordings)
+    add(Corpus.open(new(tmp_path / "alone")), [session])
+    grids = sorted((tmp_path / "alone" / "phones").iterdir())
+    shutil.copytree(tmp_path / "alone", tmp_path / "rays")
+    for path in (tmp_path / "rays" / "phones").iterdir():
+        path.unlink()
+    out = python(
+        """
+        import json, sys
+        import numpy as np
+        from facesynth.corpus import Corpus
+        from facesynth.corpus.align import align
+        from facesynth.corpus.workers import Workers
+        from facesynth.methods.emotion.detector import Clip, EmotionDetector
+
+        rays = Workers(2, "ray")
+        corpus = Corpus.open(sys.argv[1])
+        print(json.dumps(align(corpus, workers=rays).aligned))
+        clips = [Clip(u.speech.audio, u.speech.sample_rate, emotion="neutral") for u in corpus]
+        detector = EmotionDetector()
+        assert np.array_equal(detector.features_of(clips, rays), detector.features_of(clips))
+        """,
+        tmp_path / "rays",
+    )
+    assert json.loads(out) == ["01", "02"]
+    assert len(grids) == 2
+    assert lasting(tmp_path / "rays") == lasting(tmp_path / "alone")
+
+
+@pytest.mark.slow
+def test_faces_followed_by_ray_give_the_same_bytes(recordings, tmp_path):
+    """Each engine with a cache of its own, so that each follows the faces itself."""
+    if not all(_kept(name).is_file() for name in MODELS):
+        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
+    clips = [recordings("grid_s26") / f"{name}.mpg" for name in ("bgbsza", "lrbi7p", "swbm3n")]
+    for engine in ("processes", "ray"):
+        shutil.copytree(_kept("landmarks").parent, tmp_path / engine / "landmarks")
+        python(
+            "import sys; from facesynth.cli import main; main()",
+            *("corpus", "add", tmp_path / f"by {engine}", *clips, "--performer", "A", "--engine", engine, "--jobs", 2),
+            FACESYNTH_CACHE=str(tmp_path / engine),
+        )
+    assert len(Corpus.open(tmp_path / "by ray")) == 3
+    assert lasting(tmp_path / "by ray") == lasting(tmp_path / "by processes")

@@ -1,8 +1,11 @@
 import os
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from interrupted import descendants, left_after
 
 from facesynth.corpus.workers import Workers, spread
 from facesynth.errors import FacesynthError
@@ -54,3 +57,23 @@ def test_ray_that_is_absent_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(FacesynthError, match=r"facesynth\[ray\]"):
         list(spread(negative, [1], Workers(1, "ray"), "negating"))
+
+
+def left_alone(seconds):
+    time.sleep(seconds)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="who is whose child is read in /proc")
+def test_workers_end_when_their_parent_is_killed():
+    code = "from test_workers import left_alone; from facesynth.corpus.workers import Workers, spread\n"
+    code += "if __name__ == '__main__': list(spread(left_alone, [60] * 4, Workers(2), 'sleeping'))"
+    here = Path(__file__)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parent), str(here.parent.parent)])}
+    parent = subprocess.Popen([sys.executable, "-c", code], env=environment)
+    patience = time.monotonic() + 60
+    while len(family := descendants(parent.pid)) < 3:  # two workers, and what looks after their semaphores
+        assert time.monotonic() < patience
+        time.sleep(0.2)
+    parent.kill()
+    parent.wait()
+    assert not left_after(family, 30)

@@ -16,6 +16,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from facesynth.atomic import atomic_path
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.errors import FacesynthError, unknown
 from facesynth.methods.emotion.paper_features import paper_features
 from facesynth.methods.emotion.svm import Kernel, Svm, SvmSettings
@@ -109,13 +110,16 @@ class EmotionDetector(nn.Module):
             raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
         return paper_features(sound, self.settings.coefficients)
 
-    def features_of(self, clips: Sequence[Clip]) -> NDArray[np.float64]:
-        """[N, F] features of many recordings."""
-        return np.array([self.features(c.audio, c.rate) for c in track(clips, "features", len(clips))])
+    def features_of(self, clips: Sequence[Clip], workers: Workers = ALONE) -> NDArray[np.float64]:
+        """[N, F] features of many recordings, the same whoever extracts them."""
+        return np.array(list(spread(self._features_of_clip, clips, workers, "features")))
 
-    def fit(self, clips: Sequence[Clip]) -> Self:
+    def _features_of_clip(self, clip: Clip) -> NDArray[np.float64]:
+        return self.features(clip.audio, clip.rate)
+
+    def fit(self, clips: Sequence[Clip], workers: Workers = ALONE) -> Self:
         """Learn from recordings of at least two emotions."""
-        return self.fit_features(self.features_of(clips), clips)
+        return self.fit_features(self.features_of(clips, workers), clips)
 
     def fit_features(self, x: NDArray[np.float64], clips: Sequence[Clip]) -> Self:
         """The same, from features [N, F] that were computed before."""
