@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.followed_points import from_points, keep_videos_of, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def add(
             replacing=replacing,
             workers=workers,
         )
-    _keep_videos(corpus, files, report, utterance_id)
+    keep_videos_of(corpus, files, report, utterance_id)
     _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_told(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
     _leave_if_nothing(not done, report.refused, "no recording was added")
@@ -284,11 +285,11 @@ def _corpus_for(
 
     if (folder / "corpus.yaml").exists():
         corpus = Corpus.open(folder)
-        _require_points(corpus, points is not None)
+        require_points(corpus, points is not None)
         said.require_nothing()
         return corpus, ()
     if points is not None:
-        return _from_points(folder, files, header, *points, face), ()
+        return from_points(folder, files, header, *points, face), ()
     if (made := said.corpus(folder, files, header, workers)) is not None:
         return made
     return corpus_from_video(folder, files, header, face=face, workers=workers), ()
@@ -340,50 +341,6 @@ def _some(names: Sequence[str]) -> str:
 
 def _counted(counts: Mapping[str, int]) -> str:
     return ", ".join(what if len(counts) == 1 else f"{what} in {count}" for what, count in sorted(counts.items()))
-
-
-def _from_points(
-    folder: Path, files: tuple[Path, ...], header: Mapping[str, Any], box: str | None, mask: Path | None, face: int | None
-) -> Corpus:
-    """A new corpus of points followed in videos."""
-    from facesynth.capture.points.finding import read_mask
-    from facesynth.corpus.importers.points import Where, corpus_from_points
-
-    where = Where(_numbers(box) if box else None, read_mask(mask) if mask else None, face)
-    return corpus_from_points(folder, files, header, where)
-
-
-def _numbers(box: str) -> tuple[float, ...]:
-    from facesynth.errors import FacesynthError
-
-    try:
-        left, top, right, bottom = (float(number) for number in box.split(","))
-    except ValueError:
-        raise FacesynthError(f"--box wants LEFT,TOP,RIGHT,BOTTOM in pixels, such as 100,60,225,242; got {box!r}") from None
-    return left, top, right, bottom
-
-
-def _require_points(corpus: Corpus, points: bool) -> None:
-    from facesynth.errors import FacesynthError
-    from facesynth.motion.planar import is_tracked
-
-    if points and not is_tracked(corpus.layout):
-        raise FacesynthError(f"{corpus.path} is a corpus of {corpus.layout.kind}; followed points need a corpus of their own")
-
-
-def _keep_videos(corpus: Corpus, files: Iterable[Path], report: AddReport, utterance_id: str | None) -> None:
-    """The pictures of followed points stay with the corpus: the face is drawn from them."""
-    from facesynth.motion.planar import is_tracked
-
-    if not is_tracked(corpus.layout):
-        return
-    from facesynth.corpus.importers.points import forget_videos, keep_videos
-    from facesynth.corpus.recordings import VIDEO, find_recordings
-
-    ids = {*report.added, *report.changed, *report.unchanged}
-    videos = {utterance_id or r.name: r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
-    forget_videos(corpus, [name for name, parts in report.changed.items() if "motion" in parts])
-    keep_videos(corpus, {name: videos[name] for name in sorted(ids) if name in videos})
 
 
 def _read_text(path: Path) -> str:

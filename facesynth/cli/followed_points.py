@@ -1,0 +1,55 @@
+"""`corpus add --points`: points that are followed in videos, for a model that shows the real face."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from facesynth.errors import FacesynthError
+
+if TYPE_CHECKING:
+    from facesynth.corpus import Corpus
+    from facesynth.corpus.add import AddReport
+
+
+def from_points(
+    folder: Path, files: tuple[Path, ...], header: Mapping[str, Any], box: str | None, mask: Path | None, face: int | None
+) -> Corpus:
+    """A new corpus of points followed in videos."""
+    from facesynth.capture.points.finding import read_mask
+    from facesynth.corpus.importers.points import Where, corpus_from_points
+
+    where = Where(_numbers(box) if box else None, read_mask(mask) if mask else None, face)
+    return corpus_from_points(folder, files, header, where)
+
+
+def _numbers(box: str) -> tuple[float, ...]:
+    try:
+        left, top, right, bottom = (float(number) for number in box.split(","))
+    except ValueError:
+        raise FacesynthError(f"--box wants LEFT,TOP,RIGHT,BOTTOM in pixels, such as 100,60,225,242; got {box!r}") from None
+    return left, top, right, bottom
+
+
+def require_points(corpus: Corpus, points: bool) -> None:
+    """FacesynthError where points were asked for and the corpus is one of something else."""
+    from facesynth.motion.planar import is_tracked
+
+    if points and not is_tracked(corpus.layout):
+        raise FacesynthError(f"{corpus.path} is a corpus of {corpus.layout.kind}; followed points need a corpus of their own")
+
+
+def keep_videos_of(corpus: Corpus, files: Iterable[Path], report: AddReport, utterance_id: str | None) -> None:
+    """The pictures of followed points stay with the corpus: the face is drawn from them."""
+    from facesynth.motion.planar import is_tracked
+
+    if not is_tracked(corpus.layout):
+        return
+    from facesynth.corpus.importers.points import forget_videos, keep_videos
+    from facesynth.corpus.recordings import VIDEO, find_recordings
+
+    ids = {*report.added, *report.changed, *report.unchanged}
+    videos = {utterance_id or r.name: r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}
+    forget_videos(corpus, [name for name, parts in report.changed.items() if "motion" in parts])
+    keep_videos(corpus, {name: videos[name] for name in sorted(ids) if name in videos})
