@@ -74,7 +74,9 @@ def sync_problems(files: Files, header: Header, records: Iterable[Record]) -> It
         return
     curve = np.mean([correlations(np.log(np.exp(pair.heard).sum(axis=1)), pair.opening) for pair in pairs], axis=0)
     shift_s = float(LAGS[curve.argmax()]) / RATE
-    shifted = abs(shift_s) >= SHARED_S and curve.max() - curve[len(LAGS) // 2] >= max(CLEAR / 3, CLEAR_ALONE / len(pairs))
+    clear = curve.max() - curve[len(LAGS) // 2] >= max(CLEAR / 3, CLEAR_ALONE / len(pairs))
+    peaks = len(pairs) >= FEWEST or 0 < curve.argmax() < len(LAGS) - 1
+    shifted = abs(shift_s) >= SHARED_S and clear and peaks
     if shifted:
         whose = "in all recordings the mouth" if len(pairs) > 1 else "the mouth"
         yield Problem("audio", _told(whose, shift_s), _to_do("every sound" if len(pairs) > 1 else "the sound", shift_s))
