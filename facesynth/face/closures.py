@@ -7,6 +7,8 @@ head shuts what such an error left open. Least squares makes errors the other wa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -16,6 +18,12 @@ from facesynth.speech.speech import PhoneTrack
 
 MOST_MM = 3.0
 """A mouth that stays open wider than this at p, b or m is not shut: its phones or its motion are elsewhere."""
+MOST_SHUT_MM = 2.0
+"""Points of shut lips stay at most so far apart over the rest pose."""
+FEWEST = 2
+"""From so many p, b and m on they tell where this performer's lips are shut."""
+FADING_MM = 3.0
+"""What is taken off at shut lips fades out over so many millimetres."""
 WIDTH_S = 0.05
 """Standard deviation of the bump by which the mouth narrows around the moment of least opening."""
 
@@ -45,16 +53,31 @@ def with_lips_apart(weights: ArrayLike, lips: LipGap) -> NDArray[np.float64]:
 
 
 def with_lips_met(weights: ArrayLike, lips: LipGap, phones: PhoneTrack, fps: float) -> NDArray[np.float64]:
-    """Weights [T, 52] with the lips brought together at the moment of least opening of each p, b and m."""
+    """Weights [T, 52] with the lips brought together at the moment of least opening of each p, b and m.
+
+    What most of these moments left open is shut lips for this performer, and is taken off everywhere.
+    """
     opening_mm = lips.opening_mm(weights)
     frames = np.arange(len(opening_mm))
     narrower_mm = np.zeros(len(opening_mm))
-    for first, last in _bilabials(phones, fps, len(opening_mm)):
+    spans = _bilabials(phones, fps, len(opening_mm))
+    opening_mm = from_shut(opening_mm, [float(opening_mm[first:last].min()) for first, last in spans])
+    for first, last in spans:
         moment = first + int(opening_mm[first:last].argmin())
         if 0 < opening_mm[moment] <= MOST_MM:
             bump = np.exp(-0.5 * ((frames - moment) / (WIDTH_S * fps)) ** 2)
             narrower_mm = np.maximum(narrower_mm, opening_mm[moment] * bump)
     return np.clip(lips.closed(weights, np.maximum(opening_mm - narrower_mm, 0.0)), 0, 1)
+
+
+def from_shut(opening_mm: NDArray[np.float64], least_mm: Sequence[float]) -> NDArray[np.float64]:
+    """Openings [T] counted from shut lips: 0 where they are as at most p, b and m (least_mm), unchanged where they are wide."""
+    if len(least_mm) < FEWEST:
+        return opening_mm
+    shut_mm = float(np.clip(np.median(least_mm), 0, MOST_SHUT_MM))
+    over_mm = np.maximum(opening_mm - shut_mm, 0)
+    from_zero = over_mm + shut_mm * -np.expm1(-over_mm / FADING_MM)
+    return np.where(opening_mm > 0, np.minimum(from_zero, opening_mm), opening_mm)
 
 
 def _bilabials(phones: PhoneTrack, fps: float, count: int) -> list[tuple[int, int]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from facesynth.face.animation import animate
-from facesynth.face.closures import MOST_MM, with_lips_apart, with_lips_met
+from facesynth.face.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
 from facesynth.face.markers import LipGap, marker_layout
 from facesynth.face.rig import ARKIT_NAMES
 from facesynth.motion.layout import Layout
@@ -47,6 +47,16 @@ def test_the_b_is_shut_at_its_narrowest_and_nothing_else(lips):
     assert (opening[0] - opening[1]).max() == pytest.approx(opening[0][moment], rel=1e-6), (
         "never narrowed by more than was missing"
     )
+
+
+def test_what_most_closures_leave_open_is_shut_elsewhere_too_and_a_wide_mouth_stays_wide():
+    opening_mm = np.linspace(-0.5, 15, 200)
+    found = from_shut(opening_mm, [1.0, 1.2, 3.5])
+    assert np.all(np.diff(found) >= 0), "a wider mouth stays wider"
+    np.testing.assert_allclose(found[(opening_mm > 0) & (opening_mm <= 1.2)], 0, atol=1e-9)
+    np.testing.assert_allclose(found[opening_mm > 10], opening_mm[opening_mm > 10], atol=0.1)
+    for least in ([1.0], [], [0.0, 0.0], [-0.2, 0.0]):
+        np.testing.assert_array_equal(from_shut(opening_mm, least), opening_mm)
 
 
 def test_a_mouth_that_is_open_at_a_b_stays_so(lips):
