@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,20 +31,25 @@ FILE = click.Path(path_type=Path)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 
 
+WHO = (
+    click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Tasks at once; all cores otherwise."),
+    click.option("--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works."),
+    click.option("--address", default="", help="Of a Ray cluster that sees the same files; this computer otherwise."),
+)
+
+
 def spread_over(command: Any) -> Any:
-    """Who does the work: the options --jobs, --engine and --address."""
-    options = (
-        click.option(
-            "--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Tasks at once; all cores otherwise."
-        ),
-        click.option(
-            "--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works."
-        ),
-        click.option("--address", default="", help="Of a Ray cluster that sees the same files; this computer otherwise."),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
+    """Who does the work: the options --jobs, --engine and --address, which the command gets as `workers`."""
+
+    @wraps(command)
+    def with_workers(*, jobs: int, engine: Engine, address: str, **options: Any) -> None:
+        from facesynth.corpus.workers import Workers
+
+        command(workers=Workers(jobs, engine, address), **options)
+
+    for option in reversed(WHO):
+        with_workers = option(with_workers)
+    return with_workers
 
 
 @click.group("corpus")
@@ -134,9 +140,7 @@ def add(
     layout_file: Path | None,
     fps: float | None,
     axes: str,
-    jobs: int,
-    engine: Engine,
-    address: str,
+    workers: Workers,
     as_json: bool,
     **about: Any,
 ) -> None:
@@ -152,9 +156,7 @@ def add(
     from facesynth.corpus.add import add as add_recordings
     from facesynth.corpus.importers.recorder import cut_for
     from facesynth.corpus.record import read_listed
-    from facesynth.corpus.workers import Workers
 
-    workers = Workers(jobs, engine, address)
     about = {name: value for name, value in about.items() if value is not None}
     where, said = (box, mask) if points or box or mask else None, Said(layout_file, fps, axes)
     corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about), where, face, said, workers)
@@ -208,13 +210,12 @@ def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps
 @click.option("--force", is_flag=True, help="Also where phones were given or corrected by hand.")
 @spread_over
 @as_json
-def align(folder: Path, ids: tuple[str, ...], force: bool, jobs: int, engine: Engine, address: str, as_json: bool) -> None:
+def align(folder: Path, ids: tuple[str, ...], force: bool, workers: Workers, as_json: bool) -> None:
     """Place the phones of utterances with a text anew; what was corrected by hand stays."""
     from facesynth.corpus import Corpus
     from facesynth.corpus.align import align as align_corpus
-    from facesynth.corpus.workers import Workers
 
-    report = align_corpus(Corpus.open(folder), ids or None, force, Workers(jobs, engine, address))
+    report = align_corpus(Corpus.open(folder), ids or None, force, workers)
     lines = [f"aligned {len(report.aligned)}, kept {len(report.kept)}, failed {len(report.failed)}"]
     lines += [*_listing("kept", report.kept), *_listing("failed", report.failed), *_remarks(report.warnings)]
     _show(as_json, asdict(report), lines)

@@ -37,7 +37,7 @@ class Given:
         prints = {part: hash_file(path)[:DIGITS] for part, path in files.items() if path is not None}
         facts = {name: cell(value) for name, value in self.facts.items()}
         facts |= {"face": str(self.face)} if self.face is not None else {}
-        facts[FOLDER] = recording.sound.resolve().parent.name
+        facts[FOLDER] = recording.motion.resolve().parent.name
         return prints | {name: _short(value) for name, value in facts.items()}
 
     def files(self) -> tuple[Path, ...]:
