@@ -1,5 +1,6 @@
 """One command from a folder of another system to a corpus."""
 
+import subprocess
 from contextlib import suppress
 
 import numpy as np
@@ -7,12 +8,13 @@ import pytest
 import scipy.io
 from click.testing import CliRunner
 from corpora import tiny_utterances
-from interrupted import contents
+from interrupted import COMMAND, contents, killed_and_repeated
 from test_importers import articulography, hum, hurt, livelink_text, write_c3d
 
 from facesynth.cli import cli
 from facesynth.corpus import Corpus
 from facesynth.corpus.add import add
+from facesynth.corpus.importers.formats import read
 from facesynth.corpus.importers.session import corpus_from_files, survey
 from facesynth.corpus.workers import Workers
 from facesynth.errors import FacesynthError
@@ -225,8 +227,6 @@ files: {delimiter: semicolon, decimal: ",", time: Zeit, unit: cm, axes: "x,z,-y"
 
 
 def test_a_table_with_semicolons_and_decimal_commas(tmp_path):
-    from facesynth.corpus.importers.formats import read
-
     (tmp_path / "a.csv").write_text(SEMICOLONS, encoding="utf-8")
     (tmp_path / "layout.yaml").write_text(WORDS, encoding="utf-8")
     motion = read(tmp_path / "a.csv").motion
@@ -242,8 +242,6 @@ def test_a_table_with_semicolons_and_decimal_commas(tmp_path):
 
 
 def test_a_table_of_other_columns_is_told_in_a_line(tmp_path):
-    from facesynth.corpus.importers.formats import read
-
     numbers = ",".join(f"0.{k:060d}" for k in range(40))
     (tmp_path / "a.csv").write_text(f"{numbers}\n{numbers}\n")
     (tmp_path / "layout.yaml").write_text("kind: markers\nnames: [chin, lip]\n")
@@ -267,8 +265,6 @@ def test_a_table_of_other_columns_is_told_in_a_line(tmp_path):
     ],
 )
 def test_what_a_layout_file_can_say(tmp_path, kind, arrays, said):
-    from facesynth.corpus.importers.formats import read
-
     points = np.random.default_rng(3).uniform(-50, 50, (20, 2, 3))
     if kind == "npz":
         np.savez(tmp_path / "a.npz", **arrays(points))
@@ -295,8 +291,6 @@ def test_what_a_layout_file_can_say(tmp_path, kind, arrays, said):
     ],
 )
 def test_what_is_said_wrongly_is_one_clear_error(tmp_path, said, message):
-    from facesynth.corpus.importers.formats import read
-
     np.savez(tmp_path / "a.npz", points=np.ones((4, 2, 3)), fs=60)
     (tmp_path / "layout.yaml").write_text(f"kind: markers\nnames: [chin, lip]\nfiles: {said}\n")
     with pytest.raises(FacesynthError, match=message):
@@ -304,12 +298,10 @@ def test_what_is_said_wrongly_is_one_clear_error(tmp_path, said, message):
 
 
 def test_numbers_in_place_of_names_are_taken_in_order(tmp_path):
-    from facesynth.corpus.importers.formats import read
-
     (tmp_path / "a.csv").write_text("1,2,3,4,5,6\n1,2,3,4,5,6\n")
     (tmp_path / "layout.yaml").write_text("kind: markers\nnames: [chin, lip]\nfiles: {rate: 60}\n")
     reading = read(tmp_path / "a.csv")
-    np.testing.assert_array_equal(reading.motion.points[0], [[1, 2, 3], [4, 5, 6]])
+    assert reading.motion.frames[0].tolist() == [1, 2, 3, 4, 5, 6]
     assert "in the layout's order" in reading.remarks[0]
 
 
@@ -378,3 +370,23 @@ def test_seven_sensors_at_250_hz_from_arrays_of_other_names(tmp_path):
     assert motion.layout.names == names
     assert motion.layout.groups["tongue"] == (0, 1, 2)
     np.testing.assert_allclose(lip_gap(motion) - lip_gap(motion).min(), opening - opening.min(), atol=1e-4)
+
+
+@pytest.mark.slow
+def test_killed_ten_times_and_run_again_gives_the_same_bytes(tmp_path):
+    mocap(tmp_path / "session", takes=6)
+    options = [str(tmp_path / "session"), "--performer", "A", "--jobs", "2"]
+    killed_and_repeated(lambda target: ["add", str(target), *options], tmp_path, 10, seed=8)
+
+
+@pytest.mark.slow
+def test_two_ray_workers_give_the_same_bytes_as_one_process(tmp_path):
+    pytest.importorskip("ray")
+    mocap(tmp_path / "session", takes=4)
+    made = []
+    for engine in ("processes", "ray"):
+        options = ["--engine", engine, "--jobs", "1" if engine == "processes" else "2", "--performer", "A"]
+        command = [*COMMAND, "add", str(tmp_path / engine), str(tmp_path / "session"), *options]
+        subprocess.run(command, check=True, capture_output=True, timeout=300)
+        made.append({name: content for name, content in contents(tmp_path / engine).items() if name[0] != "."})
+    assert made[0] == made[1]

@@ -93,8 +93,8 @@ def corpus_from_files(
     """
     session = survey(paths, description, fps, workers)
     notes = {"notes": "; ".join(session.remarks)} if session.remarks else {}
+    keep_written(folder, session.written)  # first: a run that is interrupted in between finds no corpus, and begins anew
     corpus = Corpus.create(folder, layout=session.layout, fps=session.fps, **{**notes, **header})
-    keep_written(folder, session.written)
     return corpus, session.remarks
 
 
