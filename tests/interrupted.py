@@ -18,11 +18,11 @@ def contents(path):
     return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
 
 
-def killed_and_repeated(command, tmp_path, times, seed, new=None, forget=None):
+def killed_and_repeated(command, tmp_path, times, seed, new=None, forget=None, patience_s=LEFT_S):
     """Kill an import `times` times at random moments from its start on, let it run now and then, compare with an undisturbed run.
 
     command: the arguments of `facesynth corpus` for a folder. new: makes the empty corpus, where the import does not do so
-    itself; forget: folder that is deleted before each corpus. No process of a killed import may be left.
+    itself; forget: folder that is deleted before each corpus. No process of a killed import may be left after patience_s.
     """
     new = new or (lambda folder: None)
     new(tmp_path / "whole")
@@ -38,14 +38,14 @@ def killed_and_repeated(command, tmp_path, times, seed, new=None, forget=None):
             new(target)
             if forget is not None:
                 shutil.rmtree(forget, ignore_errors=True)
-        killed += _killed([*COMMAND, *command(target)], float(rng.uniform(0, 1)) * whole_s)
+        killed += _killed([*COMMAND, *command(target)], float(rng.uniform(0, 1)) * whole_s, patience_s)
         if trial % 5 == 4 or trial == times - 1:
             _finish(command(target))
             assert lasting(target) == wanted
     assert killed >= times / 2, "most of the kills came in time"
 
 
-def _killed(command, after_s):
+def _killed(command, after_s, patience_s):
     """Whether an import was still running when it was to be killed; whatever it had started must end with it."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
@@ -55,7 +55,7 @@ def _killed(command, after_s):
         family = descendants(process.pid)
         process.kill()
         process.wait()
-    assert not left_after(family, LEFT_S), "processes of a killed import are left"
+    assert not left_after(family, patience_s), "processes of a killed import are left"
     return True
 
 

@@ -45,8 +45,10 @@ def test_killed_fifty_times_and_run_again_gives_the_same_bytes(session, tmp_path
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="ray is not installed: pip install 'facesynth[ray]'")
 def test_killed_while_ray_works_and_run_again_gives_the_same_bytes(session, tmp_path):
+    """Ray's own agents take a minute to notice."""
     command = partial(adding, session)
-    killed_and_repeated(lambda target: command(target, "--jobs", "2", "--engine", "ray"), tmp_path, 10, seed=9, new=new)
+    rays = ["--jobs", "2", "--engine", "ray"]
+    killed_and_repeated(lambda target: command(target, *rays), tmp_path, 10, seed=9, new=new, patience_s=180)
 
 
 def converting(session, tmp_path):
