@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from facesynth.corpus import Corpus, Utterance
@@ -78,10 +78,12 @@ def read_motion(corpus: Corpus, predictions: Path, label: str, utterance_id: str
 
 
 def _motion(path: Path, utterance_id: str, corpus: Corpus) -> Motion:
+    """Of the same points, so that the corpus alone says which of them are the lips: a prediction's groups do not count."""
     named, motion = load_prediction(path, corpus.layout)
     if named != utterance_id:
         raise FacesynthError(f"{path} says that it is utterance {named!r}; its name says {utterance_id!r}: rename one")
-    return motion
+    mine, wanted = motion.layout, corpus.layout
+    return replace(motion, layout=wanted) if (mine.kind, mine.names) == (wanted.kind, wanted.names) else motion
 
 
 def refuse_strangers(corpus: Corpus, folder: Path) -> None:

@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from facesynth.methods.registry import register
 from facesynth.motion.motion import Motion
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
+COSTS = ("train_s", "train_cpu_s", "train_minutes", "rtf", "rtf_cpu", "peak_mb", "model_mb")
 CLOCKS = ("train_s", "train_cpu_s", "rtf", "rtf_cpu", "peak_mb")
 
 
@@ -225,6 +227,20 @@ def test_other_people_s_predictions_are_judged_without_layout_or_folds(corpus, f
     assert set(folds[0].test) == set(chosen)
     assert evaluation.comparison.scores["theirs"]["lve"].utterances == len(chosen)
     assert "nobody kept it" in evaluation.comparison.markdown(["train_s"])
+
+
+@pytest.mark.parametrize("changes", [{"lip_pairs": ((10, 9),)}, {"groups": {}, "lip_pairs": (), "neutral": None}])
+def test_a_prediction_does_not_choose_what_its_lips_are(result, corpus, folds, folder, tmp_path, changes):
+    for utterance_id in corpus.ids:
+        _, motion = load_prediction(folder / "predictions" / "ridge" / f"{utterance_id}.npz")
+        other = replace(motion, layout=replace(motion.layout, **changes))
+        save_prediction(tmp_path / "ridge" / f"{utterance_id}.npz", utterance_id, other)
+    again = judge_predictions(corpus, folds, tmp_path)
+    wanted = {name: score for name, score in figures(result, "ridge").items() if name not in COSTS}
+    assert {"lip_gap_corr", "closure_rate", "lve", "fdd"} <= set(wanted)
+    assert figures(again, "ridge") == wanted
+    assert again.details["ridge"].phones == result.details["ridge"].phones
+    assert again.details["ridge"].trade == result.details["ridge"].trade
 
 
 def test_predictions_that_do_not_fit_are_refused(corpus, folds, folder, tmp_path):
