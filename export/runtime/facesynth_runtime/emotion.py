@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from facesynth_runtime.errors import RuntimeInputError
 from facesynth_runtime.folder import Folder
 from facesynth_runtime.graphs import Graph
-from facesynth_runtime.sound import resample
-from facesynth_runtime.tracks import EmotionTrack, checked_audio, checked_rate
+from facesynth_runtime.sound import checked_hz, resample
+from facesynth_runtime.tracks import EmotionTrack, checked_audio, checked_piece, checked_rate, require_open
 from facesynth_runtime.voice import require_voice, voice_features
 
 LEAST_OF_A_SPEAKER = 4
@@ -61,7 +61,7 @@ class EmotionDetector:
 
     def features(self, audio: ArrayLike, rate: int) -> Floats:
         """Audio [S] to features [F]; RuntimeInputError where it is constant or too short."""
-        sound = resample(np.asarray(audio, np.float32), rate, self.rate)
+        sound = resample(checked_piece(audio), rate, self.rate)
         if self.settings["features"] == "voice":
             require_voice(sound.astype(np.float64))
             return voice_features(sound, self._mel)
@@ -89,7 +89,7 @@ class EmotionDetector:
         self, audio: ArrayLike, rate: int, *, window_s: float = 2.0, hop_s: float = 0.5, speaker: Floats | None = None
     ) -> EmotionTrack:
         """Emotions along time: the most probable one of the windows that cover each moment."""
-        sound = checked_audio(audio)
+        sound, rate = checked_audio(audio), checked_hz(rate)
         _check_windows(window_s, hop_s)
         duration_s = len(sound) / rate
         starts = window_starts(duration_s, window_s, hop_s)
@@ -145,10 +145,12 @@ class EmotionStream:
     def __init__(self, model: EmotionDetector, window_s: float, hop_s: float, speaker: Floats | None) -> None:
         self.model, self.window_s, self.hop_s, self.speaker = model, window_s, hop_s, speaker
         self.state = EmotionState(np.zeros(0, np.float32), 0, 0, (), ())
+        self._ended = False
 
     def push(self, audio: ArrayLike) -> list[tuple[float, dict[str, float]]]:
         """More sound [S]: end in seconds and probabilities of every window that became full and in which somebody spoke."""
-        heard = np.concatenate([self.state.heard, np.asarray(audio, np.float32)])
+        require_open(self._ended)
+        heard = np.concatenate([self.state.heard, checked_piece(audio)])
         self.state = replace(self.state, heard=heard)
         found = []
         while round((self.state.windows * self.hop_s + self.window_s) * self.model.rate) <= self.state.samples:
@@ -165,9 +167,10 @@ class EmotionStream:
 
     def finish(self) -> EmotionTrack:
         """The emotions along the whole sound, as `detect_track` finds them."""
+        require_open(self._ended)
         if not self.state.samples:
             raise RuntimeInputError("no sound was pushed; wanted mono samples [S]")
-        duration_s = self.state.samples / self.model.rate
+        self._ended, duration_s = True, self.state.samples / self.model.rate
         for start_s in window_starts(duration_s, self.window_s, self.hop_s)[self.state.windows :].tolist():
             self._window(start_s)
         heard = list(zip(self.state.starts_s, self.state.probabilities, strict=True))

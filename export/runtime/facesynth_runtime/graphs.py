@@ -8,7 +8,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from facesynth_runtime.errors import RuntimeInputError
+from facesynth_runtime.errors import RuntimeInputError, reject_options
 from facesynth_runtime.folder import Folder
 
 
@@ -39,6 +39,8 @@ class Graph:
 
     def __call__(self, **arrays: NDArray[Any]) -> list[NDArray[Any]]:
         """Run it; RuntimeInputError where an input is missing or has another type or shape than the manifest states."""
+        names = [port["name"] for port in self.inputs]
+        reject_options(f"the graph {self.name}", arrays.keys() - set(names), names)
         sizes: dict[str, int] = {}
         for port in self.inputs:
             array = arrays.get(port["name"])

@@ -13,7 +13,16 @@ from facesynth_runtime.errors import RuntimeInputError, reject_options
 from facesynth_runtime.folder import Folder
 from facesynth_runtime.graphs import Graph
 from facesynth_runtime.sound import resample
-from facesynth_runtime.tracks import Layout, Motion, checked_audio, checked_rate, frame_bounds
+from facesynth_runtime.tracks import (
+    Layout,
+    Motion,
+    checked_audio,
+    checked_piece,
+    checked_rate,
+    checked_seed,
+    frame_bounds,
+    require_open,
+)
 
 MOST_FRAMES = 1024
 """Frames computed at once: memory does not grow with the sound."""
@@ -72,7 +81,7 @@ class Lds:
         """The state before the first sample: the noise has already run for some seconds."""
         if not (np.isfinite(noise) and noise >= 0):
             raise RuntimeInputError(f"noise is {noise}; wanted 0 (none), 1 (as recorded) or another number that is not negative")
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(checked_seed(seed))
         count = round(self.settings["settling_s"] * self.fps)
         no_sound = np.zeros((1, count, self.settings["features"]), np.float32)
         rest = np.zeros((1, self.settings["states"]), np.float32)
@@ -81,7 +90,7 @@ class Lds:
 
     def advance(self, state: LdsState, audio: ArrayLike) -> tuple[NDArray[np.float32], LdsState]:
         """More sound [S] at the model's rate: the frames [t, C] that became final, possibly none, and the state after them."""
-        state = replace(state, heard=np.concatenate([state.heard, np.asarray(audio, np.float32)]))
+        state = replace(state, heard=np.concatenate([state.heard, checked_piece(audio)]))
         ready = int(np.searchsorted(self._stops(state.frames, self._most(state)), state.samples, side="right"))
         return self._frames(state, min(state.frames + ready, self._most(state)))
 
@@ -141,14 +150,17 @@ class LdsStream:
     """`push` sound, get frames; `state` may be kept and given to another stream."""
 
     def __init__(self, model: Lds, state: LdsState) -> None:
-        self.model, self.state = model, state
+        self.model, self.state, self._ended = model, state, False
 
     def push(self, audio: ArrayLike) -> NDArray[np.float32]:
         """More sound [S]; the frames [t, C] that became final."""
+        require_open(self._ended)
         frames, self.state = self.model.advance(self.state, audio)
         return frames
 
     def finish(self) -> NDArray[np.float32]:
         """The frames that were held back."""
+        require_open(self._ended)
+        self._ended = True
         frames, self.state = self.model.finish(self.state)
         return frames

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth_runtime.errors import RuntimeInputError
+from facesynth_runtime.tracks import checked_piece
 
 BLOCK = 8192
 """Output samples computed at once."""
@@ -18,12 +19,11 @@ KAISER_BETA = 5.0
 
 def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float32]:
     """The same sound [S] at another rate in Hz, band-limited: a polyphase filter of 20 periods of the lower rate."""
-    if not (rate > 0 and new_rate > 0 and int(rate) == rate and int(new_rate) == new_rate):
-        raise RuntimeInputError(f"sound has {rate} Hz and was asked for at {new_rate} Hz; wanted whole, positive rates")
+    rate, new_rate, audio = checked_hz(rate), checked_hz(new_rate), checked_piece(audio)
     if rate == new_rate:
-        return np.asarray(audio, np.float32)
-    common = gcd(int(rate), int(new_rate))
-    up, down = int(new_rate) // common, int(rate) // common
+        return audio
+    common = gcd(rate, new_rate)
+    up, down = new_rate // common, rate // common
     table, reach = _phases(up, down)
     each = table.shape[1]
     count = -(-len(audio) * up // down)
@@ -36,6 +36,13 @@ def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float3
         phase = first * up - (k * down - reach)
         out[k] = np.einsum("kn,kn->k", table[phase], windows[np.minimum(first + each, len(windows) - 1)])
     return out
+
+
+def checked_hz(rate: Any) -> int:
+    """A rate of sound."""
+    if not isinstance(rate, int | float | np.number) or not (np.isfinite(rate) and rate > 0 and int(rate) == rate):
+        raise RuntimeInputError(f"the sound has a rate of {rate} Hz; wanted a whole, positive number")
+    return int(rate)
 
 
 @lru_cache(maxsize=8)

@@ -117,20 +117,43 @@ class Motion:
         return len(self.frames)
 
 
-def checked_audio(audio: ArrayLike) -> NDArray[np.float32]:
-    """Mono sound [S] with S > 0 and no NaN."""
-    samples = np.asarray(audio, np.float32)
-    if samples.ndim != 1 or not len(samples):
-        raise RuntimeInputError(f"audio has shape {list(samples.shape)}; wanted mono samples [S] with S > 0")
+def checked_piece(audio: ArrayLike) -> NDArray[np.float32]:
+    """Mono sound [S], -1..1, possibly none of it."""
+    samples = np.asarray(audio)
+    if samples.ndim != 1:
+        raise RuntimeInputError(f"audio has shape {list(samples.shape)}; wanted mono samples [S]: take the mean of the channels")
+    if samples.dtype.kind != "f":
+        raise RuntimeInputError(f"audio is {samples.dtype}; wanted floats in -1..1: divide samples of 16 bits by 32768")
     if not np.isfinite(samples).all():
         raise RuntimeInputError("audio holds NaN or infinite samples; export the sound again")
+    return samples.astype(np.float32, copy=False)
+
+
+def checked_audio(audio: ArrayLike) -> NDArray[np.float32]:
+    """The same, at least one sample."""
+    samples = checked_piece(audio)
+    if not len(samples):
+        raise RuntimeInputError("audio has shape [0]; wanted mono samples [S] with S > 0")
     return samples
+
+
+def checked_seed(seed: int) -> int:
+    """A seed that numpy's generators take."""
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise RuntimeInputError(f"seed is {seed!r}; wanted a whole number that is not negative")
+    return int(seed)
 
 
 def checked_rate(got: float, wanted: int) -> None:
     """RuntimeInputError where sound has another rate than the one wanted."""
     if got != wanted:
         raise RuntimeInputError(f"the sound has {got:g} Hz; wanted {wanted} Hz: bring it there with facesynth_runtime.resample")
+
+
+def require_open(ended: bool) -> None:
+    """RuntimeInputError where a stream was finished already."""
+    if ended:
+        raise RuntimeInputError("the stream was finished; open another one with model.stream()")
 
 
 def checked_ends(ends_s: ArrayLike | Sequence[float], count: int, what: str) -> NDArray[np.float64]:

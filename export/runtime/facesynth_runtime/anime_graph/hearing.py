@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth_runtime.graphs import Graph
+from facesynth_runtime.tracks import checked_piece
 
 HOP, WINDOW = 160, 400
 RATE = 16000
@@ -39,7 +40,7 @@ class Ear:
 
     def hear(self, audio: ArrayLike) -> None:
         """More sound."""
-        sound = np.asarray(audio, np.float32)
+        sound = checked_piece(audio)
         self._sound = np.concatenate([self._sound, sound])
         self.samples += len(sound)
         self._take((len(self._sound) - WINDOW) // HOP + 1)
