@@ -32,6 +32,7 @@ def efase_content(model: Efase) -> Content:
     arrays: dict[str, NDArray[Any]] = {name: getattr(nodes, name).astype(np.int32) for name in COLUMNS}
     arrays |= {
         "node_frames": model.node_frames.cpu().numpy(),
+        "numbers": order.astype(np.int32),
         "rest": model.rest.cpu().numpy(),
         "names": np.frombuffer("\n".join(names).encode(), np.uint8),
     }
@@ -97,7 +98,7 @@ def _beyond_the_paper(model: Efase, order: Ints) -> tuple[dict[str, Any], dict[s
         "sound_weight": sound_weight,
         "pose_weight": pose_weight,
     }
-    arrays: dict[str, NDArray[Any]] = {"numbers": order.astype(np.int32)} if model.temperature > 0 else {}
+    arrays: dict[str, NDArray[Any]] = {}
     graphs = []
     if model.audio.sound is not None:
         more, parts = sound_parts(model.audio.sound, order)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import torch
 from facesynth_runtime import RuntimeInputError, load
 from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Nodes, Query, Weights
@@ -18,7 +19,7 @@ from facesynth.methods.efase import prediction
 from facesynth.methods.efase.costs import Query as TorchQuery
 from facesynth.methods.efase.costs import Weights as TorchWeights
 from facesynth.methods.efase.costs import path_cost
-from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.method import NODE_FIELDS, Efase
 from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.plan import part
 from facesynth.methods.efase.search import build_index, search
@@ -70,6 +71,38 @@ def names_of(model, path):
     return [names[node] if node >= 0 else None for node in path]
 
 
+@pytest.fixture(scope="module")
+def doubled_pair(efase_file, tmp_path_factory):
+    """A database that holds every node twice, in an order of its own and in two emotions that nobody will ask for."""
+    model, rng, folder = Efase.load(efase_file), np.random.default_rng(7), tmp_path_factory.mktemp("doubled")
+    table = model.node_table.numpy()
+    count = table.shape[1]
+    columns = dict(zip(NODE_FIELDS, np.hstack([table, table]), strict=True))
+    for name in ("before", "after"):
+        second = columns[name][count:]
+        second[second >= 0] += count
+    columns["emotions"] = np.where(rng.permuted(np.arange(2 * count).reshape(2, -1), axis=0).ravel() < count, 1, 3)
+    order = rng.permutation(2 * count)
+    nodes = sorted_nodes(MotionNodes(model.node_frames.numpy(), **columns), order)
+    names = [f"{name}{mark}" for mark in ("", "'") for name in model.facts["names"]]
+    model.facts["names"] = [names[k] for k in order]
+    model.node_table = torch.from_numpy(np.stack([getattr(nodes, name) for name in NODE_FIELDS]))
+    model._keep_index()
+    model.save(folder / "model.safetensors")
+    export_model(folder / "model.safetensors", folder / "exported")
+    return Efase.load(folder / "model.safetensors"), load(folder / "exported")
+
+
+@pytest.mark.parametrize("emotion", ["neutral", "sad", "happy"])
+def test_of_nodes_that_cost_the_same_both_take_the_same(doubled_pair, speeches, emotion):
+    model, runtime = doubled_pair
+    for speech in speeches:
+        track = EmotionTrack.constant(emotion, speech.phones.duration_s)
+        asked = Speech(speech.audio, speech.sample_rate, speech.phones, track)
+        assert names_of(runtime, runtime.plan(asked).nodes) == names_of(model, model.plan(asked).nodes)
+        assert difference(runtime.synthesize(asked).frames, model.synthesize(asked).frames) < 1e-4
+
+
 OTHERS = [
     {},  # the published ones
     {"alpha": 1.042, "beta": 0.3133, "eta": 0.1079, "gamma": 0.3088, "delta": 0.0636, "phi": 0.01373},  # the found ones
@@ -79,7 +112,7 @@ OTHERS = [
 
 def runtime_nodes(nodes, weights):
     columns = (getattr(nodes, name) for name in ("starts", "stops", "phones", "visemes", "emotions", "before"))
-    return Nodes(nodes.frames.astype(np.float32), *columns, weights)
+    return Nodes(nodes.frames.astype(np.float32), *columns, np.arange(len(nodes)), weights)
 
 
 @settings(max_examples=40, deadline=None)

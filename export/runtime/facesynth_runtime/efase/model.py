@@ -49,7 +49,7 @@ class Efase:
         self._known: dict[str, int] | None = None
         self._decode = Graph(folder, "decode", threads)
         soft = settings["temperature"] > 0
-        self.softness = Softness(settings["temperature"], settings["candidates"], arrays["numbers"]) if soft else None
+        self.softness = Softness(settings["temperature"], settings["candidates"]) if soft else None
         self.hearing: Hearing | None = None
         if settings["sound_weight"] > 0 or settings["pose_weight"] > 0:
             from facesynth_runtime.efase.hearing import Hearing  # only models that hear need it

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
+COLUMNS = ("starts", "stops", "phones", "visemes", "emotions", "before", "numbers")
 TOGETHER = 48
 """Pairs of nodes whose bending is computed at once."""
 
@@ -56,6 +57,8 @@ class Nodes:
     visemes: Ints
     emotions: Ints
     before: Ints
+    numbers: Ints
+    """[N] place in the database as it was trained: of two that cost the same, the lower one is taken."""
     weights: Weights
 
     @classmethod
@@ -64,7 +67,7 @@ class Nodes:
         frames = arrays["node_frames"].astype(np.float32, copy=False)
         if "node_frames_scale" in arrays:
             frames = frames * arrays["node_frames_scale"]
-        columns = {name: arrays[name].astype(np.int64) for name in ("starts", "stops", "phones", "visemes", "emotions", "before")}
+        columns = {name: arrays[name].astype(np.int64) for name in COLUMNS}
         return cls(frames, **columns, weights=weights)
 
     def __len__(self) -> int:
@@ -144,7 +147,8 @@ class Nodes:
         blend += (k / span)[..., None] * self.frames[np.minimum(self.starts[p][:, None] + k, last)]
         bent = blend[:, :-2] - 2 * blend[:, 1:-1] + blend[:, 2:]
         inside = k[:-2] < (length - 2)[:, None]
-        return (np.einsum("nkd,nkd->nk", bent, bent) * inside).sum(axis=1)
+        # Added up one after the other: what a pair costs must not depend on how long the pairs beside it are.
+        return np.cumsum(np.einsum("nkd,nkd->nk", bent, bent) * inside, axis=1)[:, -1]
 
     def _joint_vectors(self, which: Ints, at: Ints, inward: int, sign: float) -> Floats:
         position = self.frames[at].astype(np.float64)

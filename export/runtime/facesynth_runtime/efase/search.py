@@ -10,7 +10,7 @@ phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j). Three passes fin
   joint, by matrix products; the costly bending is computed from the front until nothing better can follow.
 
 What was computed once is kept: when a phone is added, only nodes that were left out before may have to be looked at.
-Bounds are compared with a margin for rounding; ties go to the lowest node. numpy pays for each call: all is in batches.
+Bounds are compared with a margin for rounding; ties go to the node of the lowest number. numpy pays for each call: all is in batches.
 """
 
 from __future__ import annotations
@@ -102,11 +102,16 @@ class Search:
         """[count] the last nodes of that path."""
         self._solve()
         last = self.positions[-1]
-        node, found = int(np.where(last.back == UNKNOWN, np.inf, last.phi).argmin()), []
+        node, found = self._first_of_least(np.where(last.back == UNKNOWN, np.inf, last.phi), np.arange(len(self.nodes))), []
         for position in self.positions[: -count - 1 : -1]:
             found.append(node)
             node = int(position.back[node])
         return np.array(found[::-1], np.int64)
+
+    def _first_of_least(self, cost: Floats, which: Ints) -> int:
+        """Of the nodes `which` [n] that of least cost [n]; of those, the one of the lowest number."""
+        tied = which[cost == cost.min()]
+        return int(tied[self.nodes.numbers[tied].argmin()])
 
     def cost(self, path: Ints) -> float:
         """The whole COST of a path [T]."""
@@ -212,9 +217,8 @@ class Search:
         place[i] = np.arange(len(i))
         before = place[captured]
         best, origin = np.where(before >= 0, phi[before], np.inf), captured.copy()
-        first = int(phi.argmin())
         orphan = captured < 0
-        best[orphan], origin[orphan] = phi[first] + nodes.weights.alpha * nodes.weights.pnt, i[first]
+        best[orphan], origin[orphan] = phi.min() + nodes.weights.alpha * nodes.weights.pnt, self._first_of_least(phi, i)
         lowest = phi + self._joints(i, j)
         lowest[orphan] = np.inf
         lowest[np.flatnonzero(before >= 0), before[before >= 0]] = np.inf
@@ -232,15 +236,15 @@ class Search:
 
     def _try(self, row: Ints, column: Ints, lowest: Floats, i: Ints, phi: Floats, j: Ints, best: Floats, origin: Ints) -> None:
         """Compute the pairs (i[column], j[row]) exactly, and take them off `lowest`."""
-        usable = lowest[row, column] < np.inf
+        numbers, usable = self.nodes.numbers, lowest[row, column] < np.inf
         row, column = row[usable], column[usable]
         cost = phi[column] + self.nodes.steps(i[column], j[row])
         lowest[row, column] = np.inf
-        order = np.lexsort((i[column], cost, row))
+        order = np.lexsort((numbers[i[column]], cost, row))
         row, column, cost = row[order], column[order], cost[order]
         ahead = np.concatenate([[True], row[1:] != row[:-1]])[: len(row)]
         row, node, cost = row[ahead], i[column[ahead]], cost[ahead]
-        better = (cost < best[row]) | ((cost == best[row]) & (node < origin[row]))
+        better = (cost < best[row]) | ((cost == best[row]) & (numbers[node] < numbers[origin[row]]))
         best[row[better]], origin[row[better]] = cost[better], node[better]
 
 

@@ -30,8 +30,6 @@ class Softness:
     temperature: float
     limit: int
     """Candidates of each phone, that of the cheapest path not counted."""
-    numbers: Ints
-    """[N] which comes first where two cost the same."""
 
 
 def mixtures(nodes: Nodes, queries: Sequence[Query], path: Ints, softness: Softness) -> list[Mixture]:
@@ -75,7 +73,7 @@ def _candidates(
     if len(near) > softness.limit:
         near = near[looks[near] <= np.partition(looks[near], softness.limit - 1)[softness.limit - 1]]
     astray = (after[near] < 0) | (nodes.visemes[after[near]] != follows)
-    order = np.lexsort((softness.numbers[near], astray, looks[near]))
+    order = np.lexsort((nodes.numbers[near], astray, looks[near]))
     return np.union1d(near[order[: softness.limit]], own).astype(np.int64)
 
 
