@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.table import Column, Comparison, Row
@@ -18,7 +19,7 @@ COMPARED = (
 )  # fmt: skip
 """Figures that are compared: each further one makes all the others harder to tell apart."""
 DRAWS = 100_000
-"""Bootstrap samples; the correction divides small probabilities, so they must be resolved finely."""
+"""Bootstrap samples."""
 CHUNK, WIDTH = 5_000, 128
 """Samples and differences that are computed at once."""
 LEVEL = 0.05
@@ -62,8 +63,10 @@ def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> 
     """Every pair of methods by every figure, with Holm's correction over all of them; the second take is no method.
 
     A sentence's difference is the mean over its utterances: emotions and takes of one sentence are not independent.
-    Sentences are drawn with replacement; p is twice the share of samples whose mean has the other sign. Few sentences
-    make a bootstrap too sure of itself, so p is never below 2^(1 - n), what a sign test of n sentences could reach.
+    Sentences are drawn with replacement; p is twice the share of samples whose mean has the other sign. Where none has,
+    p is that of Student's t of the mean, for the correction over thousands of pairs asks for less than any number of
+    samples resolves. Few sentences make both too sure of themselves, so p is never below 2^(1 - n), what a sign test of n
+    sentences could reach.
     """
     sentences = np.unique(comparison.sentences, return_inverse=True)[1]
     columns = [column for column in comparison.columns if column.name in figures]
@@ -77,7 +80,7 @@ def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> 
     if not found:
         return ()
     table = np.stack([f[3] for f in found], axis=1)
-    bounds = [one for k in range(0, len(found), WIDTH) for one in bootstrap(table[:, k : k + WIDTH], comparison.seed)]
+    bounds = [one for k in range(0, len(found), WIDTH) for one in bootstrap(table[:, k : k + WIDTH], comparison.seed, DRAWS)]
     tested = [
         Difference(c.name, c.unit, a.label, b.label, float(np.nanmean(d)), low, high, int((~np.isnan(d)).sum()), p)
         for (c, a, b, d), (low, high, p) in zip(found, bounds, strict=True)
@@ -86,7 +89,7 @@ def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> 
     return tuple(Difference(**{**vars(one), "p_holm": p}) for one, p in zip(tested, corrected, strict=True))
 
 
-def bootstrap(differences: Floats, seed: int, draws: int = DRAWS) -> list[tuple[float, float, float]]:
+def bootstrap(differences: Floats, seed: int, draws: int) -> list[tuple[float, float, float]]:
     """2.5 %, 97.5 % and two-sided p of each column's mean, from differences [S, M] by sentence; NaN is left out.
 
     The same samples of sentences serve every column.
@@ -103,10 +106,19 @@ def bootstrap(differences: Floats, seed: int, draws: int = DRAWS) -> list[tuple[
     drawn = np.ascontiguousarray(np.concatenate(means).T)
     low, high = np.percentile(drawn, [2.5, 97.5], axis=1)
     tail = np.minimum((drawn <= 0).mean(axis=1), (drawn >= 0).mean(axis=1))
-    floor = np.maximum(1 / draws, 2.0 ** (1 - present.sum(axis=0)))
-    p = np.minimum(np.maximum(2 * tail, floor), 1.0)
+    seen = present.sum(axis=0)
+    p = np.where(tail > 0, 2 * tail, np.minimum(1 / draws, _far_tail(drawn, seen)))
+    p = np.clip(p, 2.0 ** (1 - seen), 1.0)
     p[(values == 0).all(axis=0)] = 1.0
     return [(float(a), float(b), float(c)) for a, b, c in zip(low, high, p, strict=True)]
+
+
+def _far_tail(drawn: NDArray[np.float32], sentences: NDArray[np.int64]) -> Floats:
+    """[M] two-sided p of Student's t, of means drawn [M, draws] from so many sentences [M] each."""
+    spread = drawn.std(axis=1, dtype=np.float64) * np.sqrt(sentences / (sentences - 1))
+    mean = np.abs(drawn.mean(axis=1, dtype=np.float64))
+    steps = np.divide(mean, spread, out=np.full(len(mean), np.inf), where=spread > 0)
+    return np.asarray(2 * student.sf(steps, sentences - 1))
 
 
 def holm(p: Sequence[float]) -> list[float]:

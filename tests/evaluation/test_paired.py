@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from facesynth.evaluation import paired
 from facesynth.evaluation.paired import bootstrap, compare_pairs, holm, statements
 from facesynth.evaluation.table import Column, Comparison, Row
 
@@ -24,7 +25,7 @@ def test_holm_is_the_textbook_s():
 
 def test_the_bootstrap_of_a_mean_has_the_normal_s_interval_and_p():
     values = np.random.default_rng(0).normal(0.15, 1, 200)
-    low, high, p = bootstrap(values[:, None], 0)[0]
+    low, high, p = bootstrap(values[:, None], 0, 100_000)[0]
     error = values.std() / np.sqrt(200)
     assert low == pytest.approx(values.mean() - 1.96 * error, abs=0.1 * error)
     assert high == pytest.approx(values.mean() + 1.96 * error, abs=0.1 * error)
@@ -70,6 +71,28 @@ def test_false_alarms_stay_under_the_level():
         table = rng.normal(size=(25, 45))
         alarms += min(holm([p for _, _, p in bootstrap(table, seed, draws=10_000)])) < 0.05
     assert alarms <= 5
+
+
+def test_forty_different_rows_are_told_apart_and_forty_equal_ones_are_not(monkeypatch):
+    """The correction over 780 pairs asks for less than 1000 samples resolve."""
+    monkeypatch.setattr(paired, "DRAWS", 1000)
+    monkeypatch.setattr(paired, "CHUNK", 1000)
+    rng = np.random.default_rng(0)
+    apart = [Row(f"m{k}", {"lve": k + 0.1 * rng.normal(size=40)}) for k in range(40)]
+    alike = [Row(f"m{k}", {"lve": rng.normal(size=40)}) for k in range(40)]
+    found = compare_pairs(comparison(apart, 40), ("lve",))
+    assert len(found) == 780
+    assert all(one.distinguishable for one in found)
+    assert not any(one.distinguishable for one in compare_pairs(comparison(alike, 40), ("lve",)))
+
+
+def test_far_from_zero_p_is_student_s():
+    from scipy.stats import ttest_1samp
+
+    values = np.random.default_rng(4).normal(1.5, 1, 60)
+    p = bootstrap(values[:, None], 0, 20_000)[0][2]
+    assert p < 1e-9
+    assert np.log(p) == pytest.approx(np.log(ttest_1samp(values, 0).pvalue), rel=0.05)
 
 
 def test_a_recording_is_not_compared():
