@@ -107,6 +107,78 @@ def test_a_foreign_folder_is_refused(folder, changes, message):
         load(folder)
 
 
+def without(*keys):
+    def change(manifest):
+        for key in keys[:-1]:
+            manifest = manifest[key]
+        del manifest[keys[-1]]
+
+    return change
+
+
+def with_(value, *keys):
+    def change(manifest):
+        for key in keys[:-1]:
+            manifest = manifest[key]
+        manifest[keys[-1]] = value
+
+    return change
+
+
+FOREIGN = [
+    ("lds", with_([], "files"), "states what cannot be"),
+    ("lds", with_(None, "graphs"), "states what cannot be"),
+    ("lds", without("files", "rollout.onnx", "bytes"), "lacks 'bytes'"),
+    ("lds", without("files", "rollout.onnx"), "rollout.onnx is not listed"),
+    ("lds", without("graphs", "rollout"), "lists no graph 'rollout'"),
+    ("lds", without("graphs", "rollout", "file"), "lacks 'file'"),
+    ("lds", without("graphs", "rollout", "inputs"), "lacks 'inputs'"),
+    ("lds", with_("x", "graphs", "rollout", "outputs", 0, "name"), "gives .'frames', 'state_after'., which is not what"),
+    ("lds", without("layout"), "lacks layout"),
+    ("lds", without("layout", "names"), "lacks 'names'"),
+    ("lds", with_(None, "layout"), "states what cannot be"),
+    ("lds", without("fps"), "lacks fps"),
+    ("lds", with_("many", "fps"), "states what cannot be"),
+    ("lds", without("settings", "window_samples"), "lacks 'window_samples'"),
+    ("lds", without("settings", "settling_s"), "lacks 'settling_s'"),
+    ("lds", without("settings", "components"), "lacks 'components'"),
+    ("lds", without("latency", "look_ahead_s"), "lacks 'look_ahead_s'"),
+    ("lds", without("training_data"), "lacks training_data"),
+    ("lds", with_(3, "method"), "unknown method"),
+    ("lds", with_(["lds"], "method"), "unknown method"),
+    ("lds", with_("efase", "method"), "arrays.npz is not listed in the manifest"),
+    ("lds", with_(99, "opset"), "states opset 99; this runtime knows 20"),
+    ("lds", with_([2], "format"), "has format"),
+    ("efase", without("arrays", "before"), "lacks 'before'"),
+    ("efase", with_({}, "arrays"), "manifest.json lacks"),
+    ("efase", with_([], "arrays"), "states what cannot be"),
+    ("efase", without("arrays", "before", "shape"), "lacks 'shape'"),
+    ("efase", with_("int64", "arrays", "before", "dtype"), "the manifest wants int64"),
+    ("emotion", with_("x", "settings", "features"), "features is 'x'"),
+    ("emotion", without("settings", "features"), "lacks 'features'"),
+]
+
+
+@pytest.mark.parametrize(("method", "change", "message"), FOREIGN)
+def test_a_foreign_manifest_with_a_hash_of_its_own_is_refused(
+    lds_file, efase_file, emotion_file, exported, tmp_path, method, change, message
+):
+    file = {"lds": lds_file, "efase": efase_file, "emotion": emotion_file}[method]
+    folder = shutil.copytree(exported(file), tmp_path / "foreign")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    change(manifest)
+    (folder / "manifest.json").write_text(json.dumps(manifest | {"sha256": digest(manifest)}))
+    with pytest.raises(RuntimeInputError, match=message):
+        load(folder)
+
+
+@pytest.mark.parametrize("content", ["[" * 100_000, '{"a":' * 100_000, "\x00", ""])
+def test_a_manifest_of_nonsense_is_refused(folder, content):
+    (folder / "manifest.json").write_text(content)
+    with pytest.raises(RuntimeInputError, match="manifest.json"):
+        load(folder)
+
+
 def test_what_is_no_folder_is_refused(tmp_path):
     with pytest.raises(RuntimeInputError, match=r"manifest.json: no such file"):
         load(tmp_path)

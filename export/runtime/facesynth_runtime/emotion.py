@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth_runtime.errors import RuntimeInputError
-from facesynth_runtime.folder import Folder
+from facesynth_runtime.folder import MANIFEST, Folder
 from facesynth_runtime.graphs import Graph
 from facesynth_runtime.sound import checked_hz, resample
 from facesynth_runtime.tracks import EmotionTrack, checked_audio, checked_piece, checked_rate, require_open
 from facesynth_runtime.voice import require_voice, voice_features
 
+FRONT_ENDS = {"voice": "mel_cepstra", "paper": "cepstrum"}
 LEAST_OF_A_SPEAKER = 4
 SMALLEST_SPREAD = 1e-9
 
@@ -56,7 +57,10 @@ class EmotionDetector:
     def __init__(self, folder: Folder, threads: int) -> None:
         self.manifest, self.settings = folder.manifest, folder.settings
         self.emotions, self.rate = tuple(folder.manifest["emotions"]), int(folder.manifest["sample_rate"])
-        self._front = Graph(folder, "mel_cepstra" if self.settings["features"] == "voice" else "cepstrum", threads)
+        if self.settings["features"] not in FRONT_ENDS:
+            raise RuntimeInputError(f"{folder.path / MANIFEST}: features is {self.settings['features']!r}; wanted voice or paper")
+        self._normalise = bool(self.settings["normalise"])
+        self._front = Graph(folder, FRONT_ENDS[self.settings["features"]], threads)
         self._machine = Graph(folder, "machine", threads)
 
     def features(self, audio: ArrayLike, rate: int) -> Floats:
@@ -118,7 +122,7 @@ class EmotionDetector:
         return self(self._of_speaker(x[None], speaker))[0]
 
     def _of_speaker(self, x: Floats, speaker: Floats | None) -> Floats:
-        if not self.settings["normalise"]:
+        if not self._normalise:
             return x
         if speaker is None or len(speaker) < LEAST_OF_A_SPEAKER:
             raise RuntimeInputError(

@@ -7,6 +7,8 @@ import io
 import json
 import struct
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,12 @@ MOST_BYTES = 1 << 24
 ARRAYS = "arrays.npz"
 MOST_HEADER = 1 << 16
 """Of an array in a file, bytes."""
-KEYS = ("format", "method", "files", "graphs", "arrays", "settings", "latency", "emotions", "phones", "sha256")
+OPSETS = (20,)
+"""Of the graphs."""
+KEYS = (
+    "format", "method", "opset", "files", "graphs", "arrays", "layout", "fps", "sample_rate", "settings", "latency", "emotions",
+    "phones", "training_data", "sha256",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +56,9 @@ class Folder:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All arrays, with the types and shapes that the manifest states; they cannot be written to."""
-        path = self.path / ARRAYS
+        path, content = self.path / ARRAYS, self.bytes_of(ARRAYS)
         try:
-            found = _members(self.bytes_of(ARRAYS), list(self.manifest["arrays"]))
+            found = _members(content, list(self.manifest["arrays"]))
         except (zipfile.BadZipFile, ValueError, KeyError) as error:
             raise RuntimeInputError(f"{path}: cannot be read ({error}); export the model again") from None
         for name, wanted in self.manifest["arrays"].items():
@@ -63,15 +70,30 @@ class Folder:
         return found
 
 
+@contextmanager
+def stated_by_manifest(folder: Path) -> Iterator[None]:
+    """Whoever may write a manifest may leave things out of it: what is missing or odd is named in place of a traceback."""
+    try:
+        yield
+    except RuntimeInputError:
+        raise
+    except (KeyError, IndexError) as error:
+        raise RuntimeInputError(f"{folder / MANIFEST} lacks {error}; export the model again") from None
+    except (TypeError, AttributeError, ValueError, OverflowError) as error:
+        raise RuntimeInputError(f"{folder / MANIFEST} states what cannot be ({error}); export the model again") from None
+    except RecursionError:
+        raise RuntimeInputError(f"{folder / MANIFEST} is nested too deeply for a manifest; export the model again") from None
+
+
 def open_folder(path: str | Path) -> Folder:
     """Read the manifest and compare the hash of every file with it; RuntimeInputError names the file that is wrong."""
-    folder = Path(path)
-    manifest = _manifest(folder / MANIFEST)
-    contents = {}
-    for name, wanted in manifest["files"].items():
-        if Path(name).name != name:
-            raise RuntimeInputError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
-        contents[name] = checked_bytes(folder / name, wanted)
+    folder, contents = Path(path), {}
+    with stated_by_manifest(folder):
+        manifest = _manifest(folder / MANIFEST)
+        for name, wanted in manifest["files"].items():
+            if Path(name).name != name:
+                raise RuntimeInputError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
+            contents[name] = checked_bytes(folder / name, wanted)
     return Folder(folder, manifest, contents)
 
 
@@ -123,10 +145,16 @@ def _manifest(path: Path) -> dict[str, Any]:
         raise RuntimeInputError(f"{path}: no such file; wanted a folder written by `facesynth export`") from None
     except (OSError, ValueError) as error:
         raise RuntimeInputError(f"{path} is damaged or no manifest ({error}); export the model again") from None
-    if not isinstance(manifest, dict) or manifest.get("written_by") != "facesynth" or not set(KEYS) <= set(manifest):
+    if not isinstance(manifest, dict) or manifest.get("written_by") != "facesynth":
         raise RuntimeInputError(f"{path} was not written by `facesynth export`")
+    if lacking := [key for key in KEYS if key not in manifest]:
+        raise RuntimeInputError(f"{path} lacks {', '.join(lacking)}; export the model again")
     if manifest["format"] != FORMAT:
         raise RuntimeInputError(f"{path} has format {manifest['format']}; this runtime reads {FORMAT}: export the model again")
+    if manifest["opset"] not in OPSETS:
+        raise RuntimeInputError(
+            f"{path} states opset {manifest['opset']}; this runtime knows {OPSETS[0]}: export it again, or take a newer one"
+        )
     if _digest(manifest) != manifest["sha256"]:
         raise RuntimeInputError(f"{path} was changed after it was written; export the model again")
     return manifest

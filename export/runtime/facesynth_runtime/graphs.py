@@ -33,9 +33,12 @@ class Graph:
             raise
         except Exception as error:  # onnxruntime raises classes of its own, which share no base but Exception
             raise RuntimeInputError(f"{folder.path / entry['file']} is no graph that onnxruntime runs ({error})") from None
-        held = {port.name for port in self._session.get_inputs()}
-        if held != {port["name"] for port in self.inputs}:
-            raise RuntimeInputError(f"{folder.path / entry['file']} takes {sorted(held)}, which is not what the manifest states")
+        held = sorted(port.name for port in self._session.get_inputs())
+        given = sorted(port.name for port in self._session.get_outputs())
+        if held != sorted(port["name"] for port in self.inputs) or given != sorted(self.outputs):
+            raise RuntimeInputError(
+                f"{folder.path / entry['file']} takes {held} and gives {given}, which is not what the manifest states"
+            )
 
     def __call__(self, **arrays: NDArray[Any]) -> list[NDArray[Any]]:
         """Run it; RuntimeInputError where an input is missing or has another type or shape than the manifest states."""

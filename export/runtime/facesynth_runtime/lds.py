@@ -58,7 +58,10 @@ class Lds:
         self.manifest = manifest
         self.fps, self.rate = float(manifest["fps"]), int(manifest["sample_rate"])
         self.layout, self.emotions = Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"])
-        self.settings = folder.settings
+        self.settings, self._look_ahead_s = folder.settings, float(manifest["latency"]["look_ahead_s"])
+        self._window, self._lead_s = int(self.settings["window_samples"]), float(self.settings["lead_ms"]) / 1000
+        self._settling_s, self._inputs = float(self.settings["settling_s"]), int(self.settings["features"])
+        self._components, self._states = int(self.settings["components"]), int(self.settings["states"])
         self.features, self.innovations, self.rollout = (
             Graph(folder, g, threads) for g in ("features", "innovations", "rollout")
         )
@@ -66,7 +69,7 @@ class Lds:
     @property
     def look_ahead_s(self) -> float:
         """Frame t waits for the sound up to t / fps + this, seconds."""
-        return float(self.manifest["latency"]["look_ahead_s"])
+        return self._look_ahead_s
 
     def synthesize(self, speech: Any, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
         """Motion for speech, of which only the sound counts; `noise` 1 as recorded, 0 the deterministic part alone."""
@@ -82,9 +85,9 @@ class Lds:
         if not (np.isfinite(noise) and noise >= 0):
             raise RuntimeInputError(f"noise is {noise}; wanted 0 (none), 1 (as recorded) or another number that is not negative")
         rng = np.random.default_rng(checked_seed(seed))
-        count = round(self.settings["settling_s"] * self.fps)
-        no_sound = np.zeros((1, count, self.settings["features"]), np.float32)
-        rest = np.zeros((1, self.settings["states"]), np.float32)
+        count = round(self._settling_s * self.fps)
+        no_sound = np.zeros((1, count, self._inputs), np.float32)
+        rest = np.zeros((1, self._states), np.float32)
         _, system = self.rollout(features=no_sound, innovations=self._draw(rng, count, noise), state=rest)
         return LdsState(system, np.zeros(0, np.float32), 0, 0, noise, rng.bit_generator.state)
 
@@ -109,11 +112,11 @@ class Lds:
 
     def _starts(self, first: int, stop: int) -> NDArray[np.int64]:
         """[stop - first] first sample of each frame's window, counted from the start of the sound."""
-        times_s = (np.arange(first, max(first, stop)) + 0.5) / self.fps + self.settings["lead_ms"] / 1000
-        return np.round(times_s * self.rate).astype(np.int64) - self.settings["window_samples"] // 2
+        times_s = (np.arange(first, max(first, stop)) + 0.5) / self.fps + self._lead_s
+        return np.round(times_s * self.rate).astype(np.int64) - self._window // 2
 
     def _stops(self, first: int, stop: int) -> NDArray[np.int64]:
-        return self._starts(first, stop) + self.settings["window_samples"]
+        return self._starts(first, stop) + self._window
 
     def _frames(self, state: LdsState, stop: int) -> tuple[NDArray[np.float32], LdsState]:
         """Frames from the state's next up to `stop`; sound that is not there is silence."""
@@ -133,7 +136,7 @@ class Lds:
 
     def _windows(self, state: LdsState, first: int, stop: int) -> NDArray[np.float32]:
         """[1, T, L]"""
-        length = self.settings["window_samples"]
+        length = self._window
         starts = self._starts(first, stop) - state.first
         before, after = max(0, -int(starts[0])), max(0, int(starts[-1]) + length - len(state.heard))
         low = max(0, int(starts[0]))
@@ -142,7 +145,7 @@ class Lds:
 
     def _draw(self, rng: np.random.Generator, count: int, noise: float) -> NDArray[np.float32]:
         """[1, count, p]"""
-        uniform = rng.random((count, self.settings["components"])).astype(np.float32)[None]
+        uniform = rng.random((count, self._components)).astype(np.float32)[None]
         return np.float32(noise) * self.innovations(uniform=uniform)[0]
 
 

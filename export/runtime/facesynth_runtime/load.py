@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from facesynth_runtime.errors import RuntimeInputError, unknown
-from facesynth_runtime.folder import open_folder
+from facesynth_runtime.folder import open_folder, stated_by_manifest
 
 _MODELS = {
     "lds": "facesynth_runtime.lds:Lds",
@@ -23,11 +23,13 @@ def load(folder: str | Path, *, threads: int = 1) -> Any:
 
     threads: of each onnxruntime session.
     """
-    if threads < 1:
-        raise RuntimeInputError(f"threads is {threads}; wanted 1 or more")
+    if not isinstance(threads, int) or threads < 1:
+        raise RuntimeInputError(f"threads is {threads!r}; wanted 1 or more")
     opened = open_folder(folder)
     method = opened.manifest["method"]
-    if method not in _MODELS:
-        raise unknown(f"method in {opened.path / 'manifest.json'}", method, _MODELS)
+    if not isinstance(method, str) or method not in _MODELS:
+        raise unknown(f"method in {opened.path / 'manifest.json'}", str(method), _MODELS)
     module, _, name = _MODELS[method].partition(":")
-    return getattr(importlib.import_module(module), name)(opened, threads)
+    model = getattr(importlib.import_module(module), name)
+    with stated_by_manifest(opened.path):
+        return model(opened, threads)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from facesynth_runtime.folder import Folder
+from facesynth_runtime.folder import Folder, stated_by_manifest
 from facesynth_runtime.graphs import Graph
 
 
@@ -21,5 +21,6 @@ class Parts:
     def __getitem__(self, name: str) -> Graph:
         """A graph, loaded when it is first asked for."""
         if name not in self._loaded:
-            self._loaded[name] = Graph(self._folder, name, self._threads)
+            with stated_by_manifest(self._folder.path):
+                self._loaded[name] = Graph(self._folder, name, self._threads)
         return self._loaded[name]
