@@ -61,8 +61,12 @@ def latex(comparison: Comparison, columns: Sequence[str]) -> str:
 
 
 def best_labels(comparison: Comparison, figure: str, best: str) -> set[str]:
-    """Rows with the best mean of a figure; none where no way is better. The second take does not compete."""
-    means = {row.label: comparison.scores[row.label][figure].mean for row in comparison.rows[1:]}
+    """Rows with the best mean of a figure; none where no way is better.
+
+    The second take does not compete, nor does who lacks utterances that others have.
+    """
+    scores = {row.label: comparison.scores[row.label][figure] for row in comparison.rows[1:]}
+    means = {label: score.mean for label, score in scores.items() if score.whole}
     known = {label: _badness(mean, best) for label, mean in means.items() if math.isfinite(mean)}
     return {label for label, bad in known.items() if bad <= min(known.values())} if best else set()
 
@@ -179,4 +183,5 @@ def _latex_cell(score: Score, *, bold: bool) -> str:
     if not score.utterances:
         return "--"
     text = rf"\textbf{{{short_number(score.mean)}}}" if bold else short_number(score.mean)
-    return text + (rf" {{\scriptsize$\pm${short_number((score.high - score.low) / 2)}}}" if score.low < score.high else "")
+    half = rf" {{\scriptsize$\pm${short_number((score.high - score.low) / 2)}}}" if score.low < score.high else ""
+    return text + half + ("" if score.whole else rf" {{\scriptsize({score.utterances} of {score.of})}}")

@@ -17,7 +17,7 @@ from facesynth.errors import unknown
 from facesynth.evaluation.emotion_recognition import Confusion
 
 DRAWS = 2000
-"""Bootstrap samples of the utterances."""
+"""Bootstrap samples of the sentences."""
 ARROWS: Mapping[str, str] = {"low": " ↓", "high": " ↑", "0": " → 0", "1": " → 1", "": ""}
 
 
@@ -47,19 +47,25 @@ class Row:
 
 @dataclass(frozen=True)
 class Score:
-    """Mean over the utterances that have a figure, with its 95 % bootstrap interval."""
+    """Mean over the utterances that have a figure, with its 95 % bootstrap interval over sentences."""
 
     mean: float
     low: float
     high: float
     utterances: int
+    of: int
+    """Utterances of which anybody can have the figure."""
 
     def __str__(self) -> str:
         if not self.utterances:
             return "—"
-        return short_number(self.mean) + (
-            f" [{short_number(self.low)}, {short_number(self.high)}]" if self.low < self.high else ""
-        )
+        bounds = f" [{short_number(self.low)}, {short_number(self.high)}]" if self.low < self.high else ""
+        return short_number(self.mean) + bounds + ("" if self.whole else f" ({self.utterances} of {self.of})")
+
+    @property
+    def whole(self) -> bool:
+        """Whether no utterance is missing: means over other utterances are not compared."""
+        return self.utterances == self.of
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,17 @@ class Comparison:
     def scores(self) -> Mapping[str, Mapping[str, Score]]:
         """By row label and column name."""
         return {row.label: {column.name: self._score(row, column.name) for column in self.columns} for row in self.rows}
+
+    @cached_property
+    def possible(self) -> Mapping[str, int]:
+        """By column name: of how many utterances some row has the figure, or no row has anything."""
+        count = len(self.utterances)
+        present = {
+            column.name: [~np.isnan(row.values.get(column.name, [math.nan] * count)) for row in self.rows]
+            for column in self.columns
+        }
+        silent = ~np.any([one for seen in present.values() for one in seen], axis=0)
+        return {name: int((np.any(seen, axis=0) | silent).sum()) for name, seen in present.items()}
 
     def of_emotion(self, emotion: str) -> Comparison:
         """The same methods on the utterances of one emotion; figures of the whole run are left out."""
@@ -136,12 +153,15 @@ class Comparison:
     def _score(self, row: Row, column: str) -> Score:
         if column in row.costs:  # one figure of the whole run
             cost = row.costs[column]
-            return Score(cost, cost, cost, 0 if math.isnan(cost) else len(self.utterances))
+            count = len(self.utterances)
+            return Score(cost, cost, cost, 0 if math.isnan(cost) else count, count)
         values = np.array(row.values.get(column, ()), np.float64)
-        values = values[~np.isnan(values)]
-        if not values.size:
-            return Score(math.nan, math.nan, math.nan, 0)
-        return Score(float(values.mean()), *interval(values, self.seed), len(values))
+        present = np.flatnonzero(~np.isnan(values))
+        if not present.size:
+            return Score(math.nan, math.nan, math.nan, 0, self.possible[column])
+        sentences = [(self.sentences or self.utterances)[i] for i in present]
+        bounds = interval(values[present], sentences, self.seed)
+        return Score(float(values[present].mean()), *bounds, len(present), self.possible[column])
 
     def _column(self, name: str) -> Column:
         for column in self.columns:
@@ -180,10 +200,16 @@ class Comparison:
         }
 
 
-def interval(values: NDArray[np.float64], seed: int) -> tuple[float, float]:
-    """2.5 and 97.5 % of the means of DRAWS samples drawn from values [U] with replacement."""
-    draws = np.random.default_rng(seed).integers(len(values), size=(DRAWS, len(values)))
-    low, high = np.percentile(values[draws].mean(axis=1), [2.5, 97.5])
+def interval(values: NDArray[np.float64], sentences: Sequence[str], seed: int) -> tuple[float, float]:
+    """2.5 and 97.5 % of the means of DRAWS samples of the sentences of values [U], drawn with replacement.
+
+    A sentence brings all its utterances: emotions and takes of the same words are not independent.
+    """
+    codes = np.unique(sentences, return_inverse=True)[1]
+    totals, counts = np.bincount(codes, values - values[0]), np.bincount(codes)  # from the first: equal values stay equal
+    draws = np.random.default_rng(seed).integers(len(counts), size=(DRAWS, len(counts)))
+    means = values[0] + totals[draws].sum(axis=1) / counts[draws].sum(axis=1)
+    low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
 
 

@@ -8,9 +8,12 @@ import pytest
 
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import Confusion
+from facesynth.evaluation.exports import best_labels
 from facesynth.evaluation.table import Column, Comparison, Row, interval
 
 NAN = math.nan
+ALONE = [str(i) for i in range(40)]
+"""Each utterance says another sentence."""
 COLUMNS = (
     Column("lve", "mm", "low"),
     Column("fdd", "mm", "0"),
@@ -37,11 +40,42 @@ def test_scores_are_means_over_the_utterances_that_have_one():
 
 def test_the_interval_covers_the_true_mean_about_as_often_as_it_says():
     rng = np.random.default_rng(0)
-    covers = [low <= 0 <= high for low, high in (interval(rng.normal(size=40), i) for i in range(200))]
+    covers = [low <= 0 <= high for low, high in (interval(rng.normal(size=40), ALONE, i) for i in range(200))]
     assert 0.88 <= np.mean(covers) <= 0.99
     values = rng.normal(size=40)
-    assert interval(values, 3) == interval(values, 3)
-    assert np.ptp(interval(np.repeat(values, 16), 0)) < 0.4 * np.ptp(interval(values, 0))
+    assert interval(values, ALONE, 3) == interval(values, ALONE, 3)
+
+
+def test_more_utterances_of_the_same_sentences_tell_nothing_new():
+    values = np.random.default_rng(0).normal(size=40)
+    once, often = interval(values, ALONE, 0), np.repeat(values, 16)
+    assert interval(often, np.repeat(ALONE, 16), 0) == pytest.approx(once)
+    assert np.ptp(interval(often, [str(i) for i in range(640)], 0)) < 0.4 * np.ptp(once)
+    assert interval(np.full(3, 0.1), ["a", "b", "c"], 0) == (0.1, 0.1)
+
+
+def test_the_table_draws_sentences():
+    values = tuple(np.repeat(np.random.default_rng(0).normal(size=10), 4))
+    ids = tuple(f"u{i}" for i in range(40))
+    widths = []
+    for sentences in (ids, tuple(f"s{i // 4}" for i in range(40))):
+        score = Comparison(COLUMNS, ids, (Row("a", {"lve": values}),), 0, sentences=sentences).scores["a"]["lve"]
+        widths.append(score.high - score.low)
+    assert widths[1] > 1.5 * widths[0]
+
+
+def test_a_mean_over_fewer_utterances_says_so_and_is_never_the_best():
+    rows = (
+        Row("second take"),
+        Row("whole", {"lve": (4, 5, 6, NAN)}),
+        Row("part", {"lve": (1, NAN, NAN, NAN), "fdd": (1, 2, 3, 4)}),
+    )
+    found = Comparison(COLUMNS, tuple("abcd"), rows, 0)
+    assert "| part | 1.00 (1 of 3) |" in found.markdown()
+    assert str(found.scores["whole"]["lve"]).endswith("]")  # nobody has the fourth
+    assert best_labels(found, "lve", "low") == {"whole"}
+    alone = Comparison(COLUMNS, tuple("abcd"), (Row("part", {"lve": (1, NAN, NAN, NAN)}),), 0)
+    assert str(alone.scores["part"]["lve"]) == "1.00 (1 of 4)"
 
 
 def test_markdown_gives_units_directions_intervals_and_reasons():
@@ -49,7 +83,7 @@ def test_markdown_gives_units_directions_intervals_and_reasons():
     lines = text.splitlines()
     assert lines[0] == "| method | lve (mm) ↓ | fdd (mm) → 0 | emotion_accuracy ↑ | rtf ↓ |"
     assert lines[2].startswith("| good | 2.00 [")
-    assert lines[3] == "| poor | 4.00 | — | — | — |"
+    assert lines[3] == "| poor | 4.00 (3 of 4) | — | — | — |"
     assert "— fdd: no rest (good, poor)" in lines
     assert "— rtf: no clock (poor)" in lines
     assert "The recordings themselves: emotion accuracy 1.00, unweighted average recall 1.00." in lines
