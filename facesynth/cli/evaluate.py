@@ -71,6 +71,8 @@ def evaluate(
     from facesynth.evaluation.folds import make_folds, read_folds
     from facesynth.evaluation.report import Wish, require_drawing, write_report
 
+    if stored is not None:
+        _refuse_training()
     team = Workers(workers, engine, address)
     require_drawing()
     recordings = Corpus.open(corpus)
@@ -89,6 +91,17 @@ def evaluate(
         return
     click.echo(result.comparison.markdown(result.main_columns()))
     click.echo(f"{page}: everything, for a browser; the same as CSV, JSON and LaTeX beside it")
+
+
+def _refuse_training() -> None:
+    """UsageError where something was asked of a training that `--from-predictions` does without."""
+    names = {"methods": "METHOD", "folds": "--folds", "train_minutes": "--train-minutes", "test_limit": "--test-limit"}
+    source = click.get_current_context().get_parameter_source
+    given = [shown for name, shown in names.items() if source(name) is click.core.ParameterSource.COMMANDLINE]
+    if given:
+        raise click.UsageError(
+            f"--from-predictions trains nothing; leave out {', '.join(given)} (--given-folds chooses utterances)"
+        )
 
 
 def _contestants(methods: Sequence[str], families: Sequence[Path], *, references: bool) -> tuple[list[Family], list[Contestant]]:

@@ -55,6 +55,21 @@ def test_one_command_makes_a_report_and_its_predictions_make_it_again(corpus, fa
     assert {row["label"] for row in json.loads(again.output)["rows"]} == {"second take", "mean_face", "few", "many"}
 
 
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        (["ridge"], "METHOD"),
+        (["--folds", 5], "--folds"),
+        (["--train-minutes", 1], "--train-minutes"),
+        (["--test-limit", 9], "--test-limit"),
+    ],
+)
+def test_predictions_are_not_trained_for(corpus, tmp_path, given, named):
+    done = run(corpus, *given, "--from-predictions", tmp_path, "-o", tmp_path / "r")
+    assert done.exit_code == 2
+    assert f"leave out {named} " in done.output
+
+
 def test_what_is_wrong_is_said(corpus, tmp_path):
     assert "name a method" in run(corpus, "-o", tmp_path).output
     with pytest.raises(FacesynthError, match="ridge"):
