@@ -46,6 +46,11 @@ class Details:
     """[BINS] share of the lip residuals (synthesised - recorded, each coordinate) in each bin."""
     histogram_reach: float = 0.0
     """Outer edges of the bins, ± in the unit of the layout; the outer bins hold what lies beyond."""
+    residual_mean: float = 0.0
+    residual_spread: float = 0.0
+    """Standard deviation of the lip residuals, those beyond the histogram as they are; unit of the layout."""
+    residual_kurtosis: float = 0.0
+    """Their excess kurtosis; 0 = normal."""
     trade: tuple[Point, ...] = ()
     """What the method would score with its movement changed, see `compromises`."""
 
@@ -72,6 +77,8 @@ class DetailSums:
         self.phones: dict[str, list[Array]] = {}
         self.points: list[tuple[Array, Array]] = []
         self.histogram = np.zeros(BINS)
+        self.powers = np.zeros(5)
+        """Sums of the lip residuals to the powers of 0 to 4."""
         self.trade: list[Array] = []
 
     def add(self, utterance: Utterance, motion: Motion) -> None:
@@ -96,7 +103,7 @@ class DetailSums:
         points = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
         counted = self.histogram.sum()
         histogram = self.histogram / counted if counted else self.histogram
-        return Details(self._phone_errors(), points, histogram, self.reach, mean_points(self.trade))
+        return Details(self._phone_errors(), points, histogram, self.reach, *_shape(self.powers), trade=mean_points(self.trade))
 
     def _add_phones(self, utterance: Utterance, errors: Array) -> None:
         bounds = utterance.speech.phones.frame_bounds(utterance.motion.fps)
@@ -106,10 +113,11 @@ class DetailSums:
                 self.phones.setdefault(label, []).append(np.nanmean(part, axis=0))
 
     def _add_residuals(self, residuals: Array) -> None:
-        """Residuals beyond the outer edges count in the outer bins."""
+        """Residuals beyond the outer edges count in the outer bins, and as what they are in the powers."""
+        present = residuals[~np.isnan(residuals)]
+        self.powers += [(present**power).sum() for power in range(5)]
         if self.reach > 0:
-            present = np.clip(residuals[~np.isnan(residuals)], -self.reach, self.reach)
-            self.histogram += np.histogram(present, BINS, (-self.reach, self.reach))[0]
+            self.histogram += np.histogram(np.clip(present, -self.reach, self.reach), BINS, (-self.reach, self.reach))[0]
 
     def _add_trade(self, motion: Motion, truth: Motion) -> None:
         try:
@@ -132,6 +140,18 @@ def overall_aligned(phones: Iterable[PhoneError]) -> Mapping[str, float]:
     count = sum(row.count for row in rows)
     names = ("marker_error", "lip_error", "aligned_lip_error")
     return {name: sum(getattr(row, name) * row.count for row in rows) / count for name in names} if count else {}
+
+
+def _shape(powers: Array) -> tuple[float, float, float]:
+    """Mean, standard deviation and excess kurtosis from sums of powers 0 to 4; 0 where nothing is spread."""
+    if not powers[0]:
+        return 0.0, 0.0, 0.0
+    mean, second, third, fourth = powers[1:] / powers[0]
+    variance = second - mean**2
+    if not variance > 1e-12 * second:
+        return float(mean), 0.0, 0.0
+    about_mean = fourth - 4 * mean * third + 6 * mean**2 * second - 3 * mean**4
+    return float(mean), float(np.sqrt(variance)), float(about_mean / variance**2 - 3)
 
 
 def _mean(apart: Array) -> Array:

@@ -130,14 +130,20 @@ def histogram_figure(details: Mapping[str, Details], unit: str, colours: Mapping
 def _histogram(axis: Axes, label: str, one: Details, colour: str) -> None:
     edges = np.linspace(-one.histogram_reach, one.histogram_reach, len(one.histogram) + 1)
     middle, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
-    mean = float((one.histogram * middle).sum())
-    spread = float(np.sqrt((one.histogram * (middle - mean) ** 2).sum()))
+    mean, spread = one.residual_mean, one.residual_spread
     axis.bar(middle, one.histogram / width, width, color=colour, alpha=0.6)
     if spread > 0:
         normal = np.exp(-0.5 * ((middle - mean) / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
         axis.plot(middle, normal, color="#333333", linewidth=0.8)
-        kurtosis = float((one.histogram * (middle - mean) ** 4).sum()) / spread**4 - 3
-        axis.text(0.98, 0.95, f"excess\nkurtosis {kurtosis:.1f}", transform=axis.transAxes, ha="right", va="top", fontsize=7)
+        axis.text(
+            0.98,
+            0.95,
+            f"excess\nkurtosis {one.residual_kurtosis:.1f}",
+            transform=axis.transAxes,
+            ha="right",
+            va="top",
+            fontsize=7,
+        )
     axis.set_title(label, fontsize=9)
 
 

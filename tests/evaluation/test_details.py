@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.stats import kurtosis
 from talking_points import FPS, face, moved, phones, talk
 
 from facesynth.corpus import Utterance
@@ -70,6 +71,18 @@ def test_residuals_beyond_the_histogram_are_in_its_outer_bins():
     assert one.histogram.sum() == pytest.approx(1)
     assert one.histogram[-1] == pytest.approx(1)
     assert details(talk()).histogram[len(one.histogram) // 2] == pytest.approx(1)
+
+
+def test_spread_and_kurtosis_are_those_of_the_residuals_and_not_of_the_bins():
+    noise = 8 * np.random.default_rng(0).standard_t(5, talk().frames.shape).astype(np.float32)
+    motion = moved(talk(), talk().frames + noise)
+    one = details(motion)
+    residuals = (motion.points - talk().points)[:, [5, 6, 7, 8, 9]].astype(float).ravel()
+    assert (np.abs(residuals) > one.histogram_reach).mean() > 0.02
+    assert one.residual_mean == pytest.approx(residuals.mean(), rel=1e-6)
+    assert one.residual_spread == pytest.approx(residuals.std(), rel=1e-6)
+    assert one.residual_kurtosis == pytest.approx(kurtosis(residuals), rel=1e-6)
+    assert details(talk()).residual_spread == 0
 
 
 def test_the_curve_passes_through_the_method_and_ends_where_nothing_moves():
