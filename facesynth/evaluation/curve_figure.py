@@ -15,8 +15,8 @@ TITLES: dict[Measure, str] = {
     "lve": "lip error (lve)",
     "lve_centred": "lip error without each utterance's mean pose (lve_centred)",
 }
-ROOM = 1.25
-"""The picture reaches so far above the largest error as made: caricatures beyond are in trade.csv."""
+ROOM, EDGE = 1.25, 1.05
+"""The picture reaches so far above the largest error as made, and above each ★: caricatures beyond are in trade.csv."""
 WIDEST_ENERGY = 1.8
 
 
@@ -28,12 +28,18 @@ def curve_figure(curves: Sequence[Curve], references: Collection[str], unit: str
         for curve in curves:
             draw = _reference if curve.label in references else _method
             draw(axis, curve, measure, colours[curve.label])
-        highest = [getattr(p, measure) for curve in curves for p in curve.points if p.sharpening == 0]
         axis.set(xlabel="energy ratio (1 = as much movement as recorded)", ylabel=unit)
-        axis.set(xlim=(-0.05, WIDEST_ENERGY), ylim=(None, ROOM * max(highest)))
+        axis.set(xlim=(-0.05, WIDEST_ENERGY), ylim=(None, highest_shown(curves, measure)))
         axis.set_title(TITLES[measure], fontsize=9)
     figure.legend(*axes[0][0].get_legend_handles_labels(), fontsize=8, frameon=False, ncols=5, loc="outside upper center")
     return as_uri(figure)
+
+
+def highest_shown(curves: Sequence[Curve], measure: Measure) -> float:
+    """Upper end of the picture: above all that is as made, and above the best lively point of each curve."""
+    made = [getattr(p, measure) for curve in curves for p in curve.points if p.sharpening == 0]
+    lively = [getattr(p, measure) for curve in curves if (p := curve.lively(measure))]
+    return float(max(ROOM * max(made), EDGE * max(lively, default=0.0)))
 
 
 def _reference(axis: Axes, curve: Curve, measure: Measure, colour: str) -> None:

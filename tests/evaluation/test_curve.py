@@ -9,7 +9,7 @@ from talking_points import moved, talk
 
 from facesynth.evaluation.contestants import SECOND_TAKE, Family
 from facesynth.evaluation.curve import GAINS, SHARPENINGS, VARIATIONS, Curve, Point, compromises, curves_of, mean_points
-from facesynth.evaluation.curve_figure import curve_figure
+from facesynth.evaluation.curve_figure import curve_figure, highest_shown
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.figures import colour_of
 from facesynth.evaluation.geometry import lve, lve_centred
@@ -124,6 +124,12 @@ def test_a_recording_is_a_point_and_no_curve():
     assert not second.scaled
     assert len(method.points) == len(SHARPENINGS)
     assert len(method.scaled) == len(GAINS)
+
+
+def test_the_picture_reaches_above_every_lively_point():
+    still, lively, wild = point(1.0, 0.1), point(5.0, 1.0, sharpening=2.0), point(9.0, 1.7, sharpening=2.0)
+    assert 5 < highest_shown([Curve("x", (still, lively, wild))], "lve") < 9
+    assert highest_shown([Curve("x", (still, wild))], "lve") == pytest.approx(1.25)
 
 
 def test_the_picture_holds_every_curve():
