@@ -128,5 +128,11 @@ def rest_of(corpus: Corpus, tested: Iterable[str]) -> Fold:
 
 
 def _fold(corpus: Corpus, plain: dict[str, Any]) -> Fold:
-    test = tuple(map(str, plain["test"]))
-    return Fold(tuple(map(str, plain["train"])), test) if "train" in plain else rest_of(corpus, test)
+    test = _ids(plain, "test")
+    return Fold(_ids(plain, "train"), test) if "train" in plain else rest_of(corpus, test)
+
+
+def _ids(plain: dict[str, Any], name: str) -> tuple[str, ...]:
+    if not isinstance(plain[name], list):
+        raise TypeError(f"{name} must be a list of ids, got {plain[name]!r}")
+    return tuple(map(str, plain[name]))

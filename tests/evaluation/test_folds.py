@@ -52,6 +52,8 @@ def test_more_minutes_hold_the_fewer(corpus):
         ([], "no fold"),
         ([{"tests": []}], "holds no folds"),
         ("text", "holds no folds"),
+        ([{"test": "s00_neutral_t1"}], "holds no folds.*test must be a list"),
+        ([{"train": "0", "test": ["s00_neutral_t1"]}], "holds no folds.*train must be a list"),
     ],
 )
 def test_folds_that_leak_or_do_not_fit_are_refused(corpus, tmp_path, folds, why):
