@@ -138,15 +138,39 @@ def test_the_search_is_exact_on_random_databases(seed, pnt, strict, others):
     query = TorchQuery(wanted, wanted // 2, rng.integers(-1, 2, 8), fixed, strictly)
     best = search(index, query)
     quest, step_by_step = Search(table, StepBounds(table, bounds)), Search(table, StepBounds(table, bounds))
+    asked = [
+        Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t])) for t in range(8)
+    ]
     for t in range(8):
-        asked = Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t]))
-        quest.push(asked)
-        step_by_step.push(asked)
+        quest.push(asked[t])
+        step_by_step.push(asked[t])
         so_far = part(query, np.arange(t + 1))
-        assert step_by_step.cost(step_by_step.path()) == pytest.approx(search(index, so_far).cost, rel=1e-9, abs=1e-9)
+        assert table.cost(asked[: t + 1], step_by_step.path()) == pytest.approx(search(index, so_far).cost, rel=1e-9, abs=1e-9)
     path = quest.path()
-    assert quest.cost(path) == pytest.approx(path_cost(nodes, query, path, weights), rel=1e-9, abs=1e-9)
-    assert quest.cost(path) == pytest.approx(best.cost, rel=1e-9, abs=1e-9)
+    assert table.cost(asked, path) == pytest.approx(path_cost(nodes, query, path, weights), rel=1e-9, abs=1e-9)
+    assert table.cost(asked, path) == pytest.approx(best.cost, rel=1e-9, abs=1e-9)
+    require_the_best_ahead(table, StepBounds(table, bounds), asked, 2)
+
+
+def require_the_best_ahead(table, bounds, asked, ahead):
+    """Every settled node is on a cheapest path from the one before it; all steps of its window are computed."""
+    every = np.arange(len(table))
+    i, j = (grid.ravel() for grid in np.meshgrid(every, every, indexing="ij"))
+    steps = table.steps(i, j).reshape(len(table), -1)
+    targets = np.stack([table.class_targets(q)[table.class_of] for q in asked])
+    targets[[(every != q.node) & (q.node >= 0) for q in asked]] = np.inf
+    quest, path = Search(table, bounds), []
+    for t, query in enumerate(asked):
+        quest.push(query)
+        if t < ahead:
+            continue
+        to_come = np.zeros(len(table))
+        for target in targets[t : t - ahead : -1]:
+            to_come = (steps + target + to_come).min(axis=1)
+        whole = (steps[path[-1]] if path else 0.0) + targets[t - ahead] + to_come
+        path.append(int(quest.trace(ahead + 1)[0]))
+        quest.settle(path[-1], ahead)
+        assert whole[path[-1]] == pytest.approx(whole.min(), rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("look_ahead", [None, 1, 3])
@@ -159,6 +183,23 @@ def test_phone_by_phone_gives_what_the_whole_gives(pair, speeches, look_ahead, f
         wanted = runtime.synthesize(speech, look_ahead=look_ahead, fps=fps).frames
         assert difference(got, wanted) < 1e-5
         assert look_ahead is None or before_the_end > 0
+
+
+@pytest.mark.parametrize("look_ahead", [1, 3])
+def test_the_three_hundredth_phone_costs_what_the_tenth_does(pair, speeches, look_ahead, monkeypatch):
+    """Without a pause; counted in steps whose cost is computed, and in phones that are kept."""
+    _, runtime = pair
+    computed, steps = [], Nodes.steps
+    monkeypatch.setattr(Nodes, "steps", lambda self, i, j: computed.append(len(i)) or steps(self, i, j))
+    spoken = [label for speech in speeches for label in speech.phones.labels if label != "pau"]
+    stream, each = runtime.stream(look_ahead=look_ahead), []
+    for t in range(300):
+        computed.clear()
+        stream.push(spoken[t % len(spoken)], 0.1 * (t + 1), "happy")
+        each.append(sum(computed))
+        assert all(len(stretch.search) <= look_ahead + 1 for stretch in stream._stretches)
+    assert np.mean(each[-100:]) < 1.3 * np.mean(each[10:110])
+    assert max(each[-100:]) < 1.5 * max(each[10:110])
 
 
 def test_frames_come_as_soon_as_stated(pair, speeches):

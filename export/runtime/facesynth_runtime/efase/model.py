@@ -126,7 +126,7 @@ class Efase:
                 if len(path):
                     own = slice(t + 1 - len(path), t + 1)
                     nodes[own] = path
-                    cost += stretch.search.cost(path)
+                    cost += self.nodes.cost(queries[own], path)
                     if self.softness:
                         mixed[own] = mixtures(self.nodes, queries[own], path, self.softness)
                 stretch = Stretch(self, look_ahead)
@@ -231,23 +231,30 @@ class Efase:
 
 
 class Stretch:
-    """A run of phones that is searched as one; with a look-ahead, nodes are settled as it goes."""
+    """A run of phones that is searched as one; with a look-ahead, nodes are settled as it goes.
+
+    With a look-ahead of n, the phone n before the newest one is settled on the best path that goes on from the node settled
+    before it. Nothing older is looked at again.
+    """
 
     def __init__(self, model: Efase, look_ahead: int | None) -> None:
         if look_ahead is not None and look_ahead < 1:
             raise RuntimeInputError(f"look_ahead is {look_ahead}; wanted at least 1 phone, or None for the whole search")
         self.search, self.look_ahead = Search(model.nodes, model.bounds), look_ahead
         self.settled: list[int] = []
+        self.pushed = 0
 
     def push(self, query: Query) -> None:
-        """The next phone: with a look-ahead of n, the phone n before it is settled on the best path of this moment."""
+        """The next phone."""
         self.search.push(query)
-        if self.look_ahead is not None and len(self.search) > self.look_ahead:
+        self.pushed += 1
+        if self.look_ahead is not None and self.pushed > self.look_ahead:
             self.settled.append(int(self.search.trace(self.look_ahead + 1)[0]))
+            self.search.settle(self.settled[-1], self.look_ahead)
 
     def finish(self) -> Ints:
         """[P] a node for each phone."""
-        if not len(self.search):
+        if not self.pushed:
             return np.zeros(0, np.int64)
-        rest = self.search.trace(len(self.search) - len(self.settled))
+        rest = self.search.trace(self.pushed - len(self.settled))
         return np.concatenate([np.array(self.settled, np.int64), rest])

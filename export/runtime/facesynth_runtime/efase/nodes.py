@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -105,6 +105,13 @@ class Nodes:
         if query.strict:
             cost[~same] = np.inf
         return cost
+
+    def cost(self, queries: Sequence[Query], path: Ints) -> float:
+        """The whole COST of a path [T]."""
+        own, total = self.class_of[path], float(self.steps(path[:-1], path[1:]).sum())
+        for query, node, number in zip(queries, path.tolist(), own.tolist(), strict=True):
+            total += float(self.class_targets(query)[number]) + (0.0 if query.heard is None else float(query.heard[node]))
+        return total
 
     def steps(self, i: Ints, j: Ints) -> Floats:
         """[n] transition costs TC(i, j) of pairs of nodes."""

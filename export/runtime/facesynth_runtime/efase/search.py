@@ -10,12 +10,15 @@ phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j). Three passes fin
   joint, by matrix products; the costly bending is computed from the front until nothing better can follow.
 
 What was computed once is kept: when a phone is added, only nodes that were left out before may have to be looked at.
-Bounds are compared with a margin for rounding; ties go to the node of the lowest number. numpy pays for each call: all is in batches.
+`settle` fixes a node and forgets what lies before it, so that an input without an end costs the same at every phone.
+Bounds are compared with a margin for rounding; ties go to the node of the lowest number. numpy pays for each call: all is
+in batches.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,10 +116,26 @@ class Search:
         tied = which[cost == cost.min()]
         return int(tied[self.nodes.numbers[tied].argmin()])
 
-    def cost(self, path: Ints) -> float:
-        """The whole COST of a path [T]."""
-        targets = sum(float(self._target(position, path[t : t + 1])[0]) for t, position in enumerate(self.positions))
-        return targets + float(self.nodes.steps(path[:-1], path[1:]).sum())
+    def settle(self, node: int, ahead: int) -> None:
+        """From now on all paths go through `node`, of the last path `trace`, `ahead` phones before the newest one.
+
+        What lies before that is forgotten, and costs count from there. Bounds stay bounds, since fewer paths are left;
+        what is exact stays so where its path goes through the node.
+        """
+        del self.positions[: -ahead - 1]
+        first = self.positions[0]
+        cost = float(first.phi[node])
+        first.phi, first.back = np.full(len(self.nodes), np.inf), np.full(len(self.nodes), UNKNOWN, np.int32)
+        first.phi[node], first.back[node] = 0.0, START
+        first.beam, first.upper = np.array([node]), np.zeros(1)
+        for before, here in pairwise(self.positions):
+            here.phi -= cost
+            known = np.flatnonzero(here.back != UNKNOWN)
+            here.back[known[before.back[here.back[known]] == UNKNOWN]] = UNKNOWN
+        newest = self.positions[-1]
+        known = np.flatnonzero(newest.back != UNKNOWN)
+        newest.beam = known[np.argsort(newest.phi[known], kind="stable")[:BEAM]]
+        newest.upper = newest.phi[newest.beam]
 
     def _target(self, position: Position, which: Ints) -> Floats:
         """[n] target cost of the nodes `which`."""
