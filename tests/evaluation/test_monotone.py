@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from talking_points import FPS, face, moved, phones, talk
 
-from facesynth.evaluation.lips import closure_rate, closure_threshold
+from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
 from facesynth.evaluation.metrics import Case, metric
 
 TRACK = phones(("pau", 0.2), *[(label, 0.4 + 0.2 * i) for i, label in enumerate(["m", "aa", "b", "ay", "p", "ah"] * 3)])
@@ -67,6 +67,21 @@ def test_smoothing_loses_closures_and_opens_nothing_that_was_shut():
     assert (np.diff(rates) <= 0).all()
     assert rates[0] >= 0.9
     assert rates[-1] == 0
+
+
+@pytest.mark.parametrize(("held", "way"), [(8.0, 1), (1.0, -1)], ids=["open", "shut"])
+def test_noise_on_a_mouth_that_is_held_moves_closure_one_way(held, way):
+    """The smallest gap falls with noise; each vowel's median moves one way, so it passes the threshold once at most."""
+    still = face(np.full(240, held))
+    noise = np.random.default_rng(1).normal(size=still.frames.shape)
+    worse = [moved(still, still.frames + size * noise) for size in (0, 0.5, 1, 2, 4, 40)]
+    closed = [closure_rate(motion, TRACK, 3.0) for motion in worse]
+    false = [false_closure_rate(motion, TRACK, 3.0) for motion in worse]
+    assert (np.diff(closed) >= 0).all()
+    assert (np.diff(false) * way >= 0).all()
+    assert (closed[0], false[0]) == ((0, 0) if way > 0 else (1, 1))
+    assert closed[-1] == 1
+    assert 0 < false[-1] < 1
 
 
 def test_delay_alone_leaves_energy_as_it_is():
