@@ -1,5 +1,6 @@
 """eFASE that hears: audio terms, the expected pose, sharpening, and learning through the soft search."""
 
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,6 +12,7 @@ from corpora import tiny_corpus
 from scipy.ndimage import gaussian_filter1d
 
 from facesynth.config import load_config
+from facesynth.corpus import Corpus
 from facesynth.errors import FacesynthError
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
@@ -210,9 +212,23 @@ def test_learning_does_not_make_the_held_out_error_larger_and_repeats(halves, le
     assert learn(halves[0], settings, seed=0, rounds=3) == found
 
 
+def _with_others_spoilt(halves, path):
+    """The first half, in a copy of the corpus whose other half moves otherwise."""
+    shutil.copytree(halves[0].path, path)
+    rng = np.random.default_rng(9)
+    for utterance_id in halves[1].ids:
+        with np.load(path / "motion" / f"{utterance_id}.npz") as file:
+            arrays = dict(file)
+        arrays["frames"] = rng.normal(0, 50, arrays["frames"].shape).astype(np.float32)
+        np.savez(path / "motion" / f"{utterance_id}.npz", **arrays)
+    spoilt = Corpus.open(path)
+    assert not np.array_equal(spoilt[halves[1].ids[0]].motion.frames, halves[1][halves[1].ids[0]].motion.frames)
+    return spoilt.subset(halves[0].ids)
+
+
 def test_fitting_learns_from_its_own_corpus_alone_and_keeps_what_it_found(halves, tmp_path):
     settings = {"audio_weight": 0.2, "temperature": 2.0, "candidates": 20}
-    wanted = learn(halves[0], settings, seed=4)
+    wanted = learn(_with_others_spoilt(halves, tmp_path / "spoilt"), settings, seed=4)
     model = Efase(**settings, learn=True).fit(halves[0], seed=4)
     assert {name: model.config[name] for name in wanted.settings} == wanted.settings
     assert model.facts["learned"]["improvement"] == wanted.improvement
