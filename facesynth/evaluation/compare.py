@@ -66,6 +66,16 @@ class Evaluation:
         """Error against movement, a curve for each method and for each family that is one method."""
         return curves_of({label: one.trade for label, one in self.details.items()}, families)
 
+    def warnings(self) -> list[str]:
+        """What whoever reads the table must know of how its rows were made."""
+        sources = {one.get("versions", {}).get("source") for made in self.accounts.values() for one in made}
+        if len(sources) < 2:
+            return []
+        return [
+            f"The rows were made by {len(sources)} versions of facesynth's source (see “Made of” on the page): "
+            "rows of different ones differ by more than their settings."
+        ]
+
     def main_columns(self) -> list[str]:
         """Columns of the short table: those of `MAIN` that some method has."""
         scores = self.comparison.scores.values()

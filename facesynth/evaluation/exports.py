@@ -30,7 +30,7 @@ def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) 
     """Everything of the page that is a number, as CSV, JSON and LaTeX."""
     comparison, curves = result.comparison, result.curves(families)
     texts = {
-        "table.md": comparison.markdown(),
+        "table.md": "\n".join([comparison.markdown(), *(f"{one}\n" for one in result.warnings())]),
         "table.csv": comparison.csv(),
         "table.tex": latex(comparison, result.main_columns()),
         "utterances.csv": utterances_csv(comparison),

@@ -133,6 +133,7 @@ def _train(job: Job, corpus: Corpus) -> dict[str, Any]:
         "train_minutes": minutes_of(corpus, learned),
         "model_mb": job.model.stat().st_size / MB,
         "tested": list(job.fold.test),
+        "learned": method.facts.get("learned"),
     }
 
 

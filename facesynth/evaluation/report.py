@@ -89,7 +89,7 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "synthetic": corpus.synthetic,
         "main": table(comparison, result.main_columns()),
         "whole": table(comparison, [column.name for column in comparison.columns]),
-        "notes": comparison.markdown(result.main_columns()).split("\n\n")[1:],
+        "notes": result.warnings() + comparison.markdown(result.main_columns()).split("\n\n")[1:],
         "whole_notes": comparison.markdown().split("\n\n")[1:],
         "verdicts": verdicts(result),
         "many": len(comparison.rows) > MOST_IN_WORDS,
@@ -107,7 +107,6 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
         "shown": list(_shown(result, corpus, face, wish, colours)),
         "provenance": comparison.provenance,
         "made_of": {label: accounts for label, accounts in result.accounts.items() if accounts},
-        "sources": len({one["versions"]["source"] for accounts in result.accounts.values() for one in accounts}),
         "definitions": {c.name: DEFINITIONS[c.name] for c in comparison.columns if c.name in DEFINITIONS},
         "unit": unit,
     }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.curve import Point
@@ -23,7 +25,7 @@ class Verdict:
 
     label: str
     good: bool
-    """Better than the mean face by marker error and by lip error, on average."""
+    """Better than the mean face by marker error and by lip error, on average over the utterances that both have."""
     text: str
     unsure: tuple[str, ...]
     """Figures by which it is not told apart from the mean face."""
@@ -38,21 +40,21 @@ def verdicts(result: Evaluation) -> list[Verdict]:
 
 
 def _verdict(result: Evaluation, label: str) -> Verdict:
-    scores, parts, lost, unsure = result.comparison.scores, [], [], []
+    parts, lost, unsure = list[str](), list[str](), list[str]()
     units = {column.name: column.unit for column in result.comparison.columns}
     for figure in FIGURES:
-        mine, still = scores[label][figure], scores[MEAN_FACE][figure]
-        if not mine.utterances or not still.utterances:
+        mine, still, count = _common(result, (label, figure), (MEAN_FACE, figure))
+        if not count:
             continue
         way = "less"
-        if mine.mean >= still.mean:
+        if mine >= still:
             way = "MORE"
             lost.append(figure)
         if not _sure(result.differences, label, figure):
             unsure.append(figure)
         parts.append(
-            f"{figure} {short_number(mine.mean)} {units[figure]}, {way} than the mean face's {short_number(still.mean)}"
-            f" ({'not told apart' if figure in unsure else 'told apart'})"
+            f"{figure} {short_number(mine)} {units[figure]}, {way} than the mean face's {short_number(still)}"
+            f" ({'not told apart' if figure in unsure else 'told apart'}{_of_how_many(result, figure, count)})"
         )
     why = " ".join(["", *reasons(result, label, lost)]) if lost else ""
     return Verdict(label, not lost, f"{'; '.join(parts)}.{why}", tuple(unsure))
@@ -64,7 +66,7 @@ def reasons(result: Evaluation, label: str, lost: Sequence[str]) -> list[str]:
     trade = sorted((p for p in result.details[label].trade if p.sharpening == 0), key=lambda point: point.gain)
     if not trade:
         return [*found, "The layout does not tell lip error by size of movement."]
-    unmoved = result.comparison.scores[MEAN_FACE]["lve"].mean
+    _, unmoved, _ = _common(result, (label, "lve"), (MEAN_FACE, "lve"))
     return [*found, _pose(trade[0], unmoved), _movement(trade), *_chance(result, label)]
 
 
@@ -92,14 +94,29 @@ def _movement(trade: Sequence[Point]) -> str:
 
 def _chance(result: Evaluation, label: str) -> list[str]:
     scores = result.comparison.scores[label]
-    mean, still = scores["error_of_mean"], result.comparison.scores[MEAN_FACE]["marker_error"]
-    if not mean.utterances:
+    if not scores["error_of_mean"].utterances:
         return []
-    side = "less" if mean.mean < still.mean else "no less"
+    mean, still, _ = _common(result, (label, "error_of_mean"), (MEAN_FACE, "marker_error"))
+    side = "less" if mean < still else "no less"
     return [
-        f"It draws from chance: the mean of several drawn motions has a marker_error of {short_number(mean.mean)}, "
+        f"It draws from chance: the mean of several drawn motions has a marker_error of {short_number(mean)}, "
         f"{side} than the mean face; a single one has {short_number(scores['marker_error'].mean)}."
     ]
+
+
+def _common(result: Evaluation, *wanted: tuple[str, str]) -> tuple[float, float, int]:
+    """Means of two (row label, figure) over the utterances that both have, and how many these are."""
+    rows = {row.label: row.values for row in result.comparison.rows}
+    missing = [np.nan] * len(result.comparison.utterances)
+    values = np.array([rows[label].get(figure, missing) for label, figure in wanted], np.float64)
+    both = values[:, ~np.isnan(values).any(axis=0)]
+    mine, still = both.mean(axis=1) if both.size else (np.nan, np.nan)
+    return float(mine), float(still), both.shape[1]
+
+
+def _of_how_many(result: Evaluation, figure: str, count: int) -> str:
+    possible = result.comparison.possible[figure]
+    return f", on {count} of {possible} utterances" if count < possible else ""
 
 
 def _sure(differences: tuple[Difference, ...], label: str, figure: str) -> bool:

@@ -2,6 +2,7 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from facesynth.evaluation.folds import make_folds
 from facesynth.evaluation.paired import tallied
 from facesynth.evaluation.point_face import PointFace
 from facesynth.evaluation.report import PAGE, Wish, pictured_rows, typical, write_report
+from facesynth.evaluation.table import short_number
 from facesynth.evaluation.verdict import verdicts
 from facesynth.face.video import read_video
 from facesynth.methods.baselines.mean_face import MeanFace
@@ -39,6 +41,16 @@ class WrongFace(MeanFace):
         motion = super().synthesize(speech)
         shaking = 6 + 2 * np.sin(np.arange(len(motion)))[:, None]
         return Motion(motion.frames + shaking, motion.fps, motion.layout)
+
+
+@register("knowing")
+class Knowing(MeanFace):
+    """A method that tells what it learned."""
+
+    def fit(self, corpus, *, seed=0):
+        super().fit(corpus, seed=seed)
+        self.facts["learned"] = {"temperature": 0.25}
+        return self
 
 
 METHODS = (
@@ -120,6 +132,35 @@ def test_a_method_that_loses_to_the_mean_face_is_named_with_the_reason(result, p
     assert "is no nearer to the recording than the mean of all recordings" in said["wrong"].text
     assert "next to nothing of that movement follows the recorded one" in said["wrong"].text
     assert "NOT better than the mean face" in page
+
+
+def test_a_verdict_compares_the_utterances_that_both_have(result):
+    """Of the two utterances on which the mean face is nearest, phone mean is judged; its mean would look good elsewhere."""
+    rows = {row.label: row for row in result.comparison.rows}
+    order = np.argsort(rows["mean face"].values["lve"])
+    partly = [rows["phone mean"].values["lve"][i] if i in order[:2] else np.nan for i in range(len(order))]
+    row = replace(rows["phone mean"], values={**rows["phone mean"].values, "lve": partly})
+    comparison = replace(result.comparison, rows=(rows["mean face"], row))
+    said = {one.label: one for one in verdicts(replace(result, comparison=comparison))}["phone mean"]
+    still = np.mean([rows["mean face"].values["lve"][i] for i in order[:2]])
+    assert f"the mean face's {short_number(still)} (" in said.text
+    assert f", on 2 of {len(order)} utterances)" in said.text
+
+
+def test_rows_made_by_different_versions_are_named_under_the_table(corpus, result, tmp_path, page):
+    assert "versions of facesynth" not in page
+    accounts = {label: [{**one, "versions": {**one["versions"]}} for one in made] for label, made in result.accounts.items()}
+    accounts["little"][0]["versions"]["source"] = "0" * 64
+    text = write_report(tmp_path, replace(result, accounts=accounts), corpus, [], Wish("Tiny", videos=False)).read_text()
+    for where in (text, (tmp_path / "table.md").read_text()):
+        assert "The rows were made by 2 versions of facesynth" in where
+
+
+def test_what_was_learned_is_kept_and_shown(corpus, tmp_path):
+    result = evaluate((Contestant("knowing", "knowing"),), corpus, make_folds(corpus, 2), tmp_path)
+    assert [one["learned"] for one in result.accounts["knowing"]] == [{"temperature": 0.25}] * 2
+    text = write_report(tmp_path, result, corpus, [], Wish("Knowing", videos=False)).read_text()
+    assert 'learned {"temperature": 0.25}' in text
 
 
 def test_what_it_was_made_from_is_said(page, corpus):
