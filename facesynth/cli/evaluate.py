@@ -89,7 +89,7 @@ def evaluate(
     if as_json:
         click.echo(result.comparison.json())
         return
-    click.echo(result.comparison.markdown(result.main_columns()))
+    click.echo("\n".join([result.comparison.markdown(result.main_columns()), *result.warnings()]))
     click.echo(f"{page}: everything, for a browser; the same as CSV, JSON and LaTeX beside it")
 
 
