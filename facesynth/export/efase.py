@@ -22,6 +22,8 @@ from facesynth.methods.efase.nodes import Ints
 from facesynth.speech.mel import LogMel
 
 COLUMNS = ("starts", "stops", "phones", "visemes", "emotions", "before")
+GUARD_S = 0.4
+"""Of settled motion after a frame, beyond which nothing changes it."""
 
 
 def efase_content(model: Efase) -> Content:
@@ -73,8 +75,10 @@ def efase_content(model: Efase) -> Content:
         sample_rate=LogMel().sample_rate if graphs else None,
         latency={
             "look_ahead_s": None,
-            "about": "a stretch between silences is searched as a whole; with look_ahead=n a node is settled n phones later. "
-            "Frames follow 0.4 s after the node that comes after theirs is settled",
+            "phones_after": 1,
+            "guard_s": GUARD_S,
+            "about": "a stretch between silences is searched as a whole; with look_ahead=n a node is settled n phones later. A "
+            "frame is final when n + phones_after more phones are known and guard_s of motion, as far as smoothing reaches",
         },
         arrays=arrays,
         derived=bounds,

@@ -26,14 +26,17 @@ def path_search_graph() -> Graph:
     )
     targets, steps = (b.input(port.name, port.dtype, port.shape) for port in inputs)
     by_time = b.op("Transpose", targets, perm=[1, 0, 2])
-    first = b.op("Squeeze", b.span(by_time, 0, 0, 1), b.ints(0))
-    later, between = b.span(by_time, 0, 1, 2**62), b.op("Transpose", steps, perm=[1, 0, 2, 3])
-    reached, origins = b.ops("Scan", 2, first, later, between, body=_forth().graph(), num_scan_inputs=2)
+    # A step from nowhere that costs nothing stands before the others: one phone is a path, too, and a scan takes no length of 0.
+    batch, wide, nothing = b.shape_of(targets, 0), b.shape_of(targets, 2), b.constant(0.0, "float64")
+    nowhere = b.op("Expand", nothing, b.op("Concat", batch, wide, axis=0))
+    free = b.op("Expand", nothing, b.op("Concat", b.ints(1), batch, wide, wide, axis=0))
+    between = b.op("Concat", free, b.op("Transpose", steps, perm=[1, 0, 2, 3]), axis=0)
+    reached, origins = b.ops("Scan", 2, nowhere, by_time, between, body=_forth().graph(), num_scan_inputs=2)
     cost = b.op("ReduceMin", reached, b.ints(1), keepdims=0)
     last = b.op("ArgMin", reached, axis=1, keepdims=0)
     back = {"body": _back().graph(), "num_scan_inputs": 1, "scan_input_directions": [1], "scan_output_directions": [1]}
-    _, earlier = b.ops("Scan", 2, last, origins, **back)
-    path = b.op("Transpose", b.op("Concat", earlier, b.op("Unsqueeze", last, b.ints(0)), axis=0), perm=[1, 0])
+    _, chosen = b.ops("Scan", 2, last, origins, **back)
+    path = b.op("Transpose", chosen, perm=[1, 0])
     outputs = (Port("path", "int64", ("batch", "phones"), "candidate"), Port("cost", "float64", ("batch",), "cost"))
     for value, port in zip((path, cost), outputs, strict=True):
         b.output(value, port.name, port.dtype, port.shape)
@@ -57,9 +60,9 @@ def _back() -> Builder:
     body = Builder("back")
     at = body.input("at", "int64", ("batch",))
     origin = body.input("origin_of", "int64", ("batch", "candidates"))
-    chosen = body.op("Squeeze", body.op("GatherElements", origin, body.op("Unsqueeze", at, body.ints(1)), axis=1), body.ints(1))
-    body.output(chosen, "at_next", "int64", ("batch",))
-    body.output(chosen, "here", "int64", ("batch",))
+    before = body.op("Squeeze", body.op("GatherElements", origin, body.op("Unsqueeze", at, body.ints(1)), axis=1), body.ints(1))
+    body.output(before, "at_next", "int64", ("batch",))
+    body.output(at, "here", "int64", ("batch",))
     return body
 
 

@@ -63,18 +63,29 @@ def rasta_plp_stream_graph(plp: RastaPlp) -> Graph:
 
     def example(batch: int, count: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
         frames = (0.1 * rng.standard_normal((batch, count, length))).astype(np.float32)
-        state = {"history": np.zeros((batch, 4, bands)), "level": np.zeros((batch, bands)), "fresh": np.array(1.0)}
-        return {"windows": frames, **state}
+        state = {"history": rng.normal(-5, 3, (batch, 4, bands)), "level": rng.standard_normal((batch, bands))}
+        return {"windows": frames, **state, "fresh": np.array(float(rng.random() < 0.5))}
 
     def reference(arrays: Arrays) -> list[NDArray[Any]]:
         frames = torch.from_numpy(arrays["windows"]).double()
         power = torch.fft.rfft(frames * plp.window, plp.fft).abs() ** 2 + ROUNDING_POWER * plp.window.square().sum()
         energies = (power @ plp.bands).log()
-        filtered = plp.filter_along_time(energies)
+        filtered = plp.filter_along_time(energies) if arrays["fresh"] else _continued(plp, energies, arrays)
         cepstra = plp.cepstra(torch.exp((filtered + plp.loudness.log()) / 3))
         return [cepstra.float().numpy(), energies[:, -4:].numpy(), filtered[:, -1].numpy()]
 
     return Graph(b.name, "RASTA-PLP cepstra of windows, with the filter's state", b.model(), inputs, outputs, example, reference)
+
+
+def _continued(plp: RastaPlp, energies: torch.Tensor, arrays: Arrays) -> torch.Tensor:
+    """What the RASTA filter gives after four frames of history, its last output decaying."""
+    from scipy.signal import lfilter
+
+    pole = float(plp.rasta[-1] / plp.rasta[-2])
+    held = np.concatenate([arrays["history"], energies.numpy()], axis=1)
+    driven = lfilter([0.2, 0.1, 0.0, -0.1, -0.2], [1.0], held, axis=1)[:, 4:]
+    filtered, _ = lfilter([1.0], [1.0, -pole], driven, axis=1, zi=pole * arrays["level"][:, None])
+    return torch.from_numpy(filtered)
 
 
 def _log_energies(b: Builder, frames: str, plp: RastaPlp) -> str:

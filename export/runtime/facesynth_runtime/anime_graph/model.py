@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ EMOTION_CHANGES_S, SMALLEST_SWING = 0.08, 1e-4
 LEAST_SHARE = 1e-3
 """Candidates that are less probable than this are left out of a mean."""
 PASS_ALL, ORDER = 0.98, 6
+FORGETS = 1e-5
+"""Share of a step that is left of it where a filter no longer feels it."""
 OPTIONS = ("seed", "look_ahead", "to_emotion", "to_intensity")
 
 
@@ -65,12 +68,24 @@ class AnimeGraph:
         self.nodes = Nodes(arrays, [viseme for _, viseme in manifest["phones"]], self.pairs, maps)
         self._mixing, self._cutoffs = arrays["mixing"], arrays["cutoffs_hz"]
         self._dropped = arrays.get("dropped")
+        self._filtered = np.flatnonzero(self._cutoffs < PASS_ALL * self.fps / 2)
+        self._sections = butterworth(ORDER, 2 * self._cutoffs[self._filtered] / self.fps)
         self.expectation: Expectation | None = None
         if self.weights.pose > 0:
             from facesynth_runtime.expectation import Bands, Expectation  # only models that expect need it
 
             self.expectation, self._bands = Expectation(folder, arrays, threads), Bands(folder, threads)
         self._plp, self._encode, self._decode = (Graph(folder, name, threads) for name in ("rasta_plp", "encode", "decode"))
+
+    @cached_property
+    def settles_frames(self) -> int:
+        """How far the filters reach to either side; it is the lowest cut-off that reaches farthest."""
+        if not len(self._filtered):
+            return 0
+        far = int(np.ceil(2 * np.log(FORGETS) / np.log(self._sections[:, 2].max())))  # by the pole nearest to the circle
+        step = np.repeat([0.0, 1.0], far)[:, None].repeat(len(self._filtered), axis=1)
+        felt = np.abs(forth_and_back(self._sections, step, 0)[:far]).max(axis=1) > FORGETS
+        return far - int(felt.argmax())
 
     @property
     def closed_gap(self) -> float:
@@ -209,12 +224,10 @@ class AnimeGraph:
     def low_pass(self, components: Floats) -> Floats:
         """Components [T, D] without what lies above each one's cut-off, nothing shifted in time."""
         smooth = components.copy()
-        columns = np.flatnonzero(self._cutoffs < PASS_ALL * self.fps / 2)
+        columns = self._filtered
         if len(columns) and len(components) > 1:
-            cutoffs = self._cutoffs[columns]
-            reach = np.minimum(len(components) - 1, np.round(2 * self.fps / cutoffs).astype(np.int64))
-            sections = butterworth(ORDER, 2 * cutoffs / self.fps)
-            smooth[:, columns] = forth_and_back(sections, components[:, columns], reach)
+            reach = np.minimum(len(components) - 1, np.round(2 * self.fps / self._cutoffs[columns]).astype(np.int64))
+            smooth[:, columns] = forth_and_back(self._sections, components[:, columns], reach)
         return smooth
 
     def _blended(self, plan: Plan) -> Floats:

@@ -15,17 +15,12 @@ from facesynth_runtime.errors import RuntimeInputError
 if TYPE_CHECKING:
     from facesynth_runtime.anime_graph.model import AnimeGraph
 
-SETTLES_S = 0.8
-"""The zero-phase filter needs to see this much of what follows a frame."""
-REMEMBERS_S = 2.0
-"""What lies further back no longer changes a filtered frame."""
-
 
 class AnimeStream:
     """`hear` sound and `push` phones, in any order and in pieces of any size; both give the frames [n, C] that became final.
 
     A phone waits for its sound. A frame is final when `look_ahead` phones after its own are known, two more nodes are
-    settled and 0.8 s of motion follow it.
+    settled and as much motion follows it as its filter reaches (`model.settles_frames`).
     """
 
     def __init__(self, model: AnimeGraph, look_ahead: int) -> None:
@@ -98,10 +93,10 @@ class AnimeStream:
         fresh = [self.blender.blended(t) for t in range(self._pieces_done, ready)]
         self._pieces_done = max(self._pieces_done, ready)
         self._blended = np.concatenate([self._blended, *fresh])
-        stop = max(self._smooth_done, len(self._blended) - (0 if last else round(SETTLES_S * model.fps)))
+        stop = max(self._smooth_done, len(self._blended) - (0 if last else model.settles_frames))
         if stop == self._smooth_done and not last:
             return self._lips.push(np.zeros((0, self._lips.width)), last=False)
-        start = max(0, self._smooth_done - round(REMEMBERS_S * model.fps))
+        start = max(0, self._smooth_done - model.settles_frames)
         smooth = model.low_pass(self._blended[start:])[self._smooth_done - start : stop - start]
         self._smooth_done = stop
         return self._lips.push(model.decode(smooth), last=last)
