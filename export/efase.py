@@ -1,8 +1,6 @@
 """Export an eFASE database: python export/efase.py efase.safetensors -o folder/ [--weights float16]."""
 
-from pathlib import Path
-
-from facesynth.cli.export import export
+from facesynth.cli.export import export_only
 
 if __name__ == "__main__":
-    export(prog_name=Path(__file__).name)
+    export_only("efase")

@@ -25,7 +25,7 @@ def main(model: Path, speech: Path, site: Path) -> None:
     rig = load_head()
     layout = marker_layout(rig)
     export_model(model, site / "model")
-    subject = Subject("graphs", {"licences": ["CC0-1.0"]}, layout.to_dict(), None, ())
+    subject = Subject("graphs", {"licences": ["CC0-1.0"], "consents": ["nobody was recorded"]}, layout.to_dict(), None, ())
     write_folder(site / "face", subject, Content((mesh_deformation_graph(rig, layout),), {}, {"look_ahead_s": 0.0}))
     audio, rate = load_audio(speech)
     save_wav(site / "speech.wav", resample(audio, rate, RATE), RATE)

@@ -1,21 +1,73 @@
 // A folder that `facesynth export` wrote: verified, then run by onnxruntime-web. The same file serves the page and Node.
 
 export async function openFolder(read, ort) {
-  const manifest = JSON.parse(new TextDecoder().decode(await read("manifest.json")));
-  if (manifest.written_by !== "facesynth" || manifest.format !== 2) throw new Error("manifest.json was not written by facesynth export");
+  const text = new TextDecoder().decode(await read("manifest.json"));
+  const manifest = JSON.parse(text);
+  if (manifest?.written_by !== "facesynth" || manifest.format !== 2) throw new Error("manifest.json was not written by facesynth export");
+  await checkManifest(text, manifest);
   const graphs = {};
   for (const [name, entry] of Object.entries(manifest.graphs)) {
+    const wanted = manifest.files[entry.file];
+    if (!wanted) throw new Error(`${entry.file} is not listed in the manifest`);
     const content = await read(entry.file);
-    await checkHash(entry.file, content, manifest.files[entry.file].sha256);
+    if ((await sha256(content)) !== wanted.sha256) throw new Error(`${entry.file} does not have the hash that the manifest states`);
     graphs[name] = { entry, session: await ort.InferenceSession.create(content) };
   }
   return { manifest, graphs };
 }
 
-async function checkHash(name, content, wanted) {
+// The manifest's own hash is that of its JSON without the hash, keys sorted, no spaces. JSON.parse would forget that 60.0
+// is not written 60, so the text itself is put in that order.
+async function checkManifest(text, { sha256: wanted }) {
+  const plain = compact(text, { at: 0 }, "sha256");
+  if ((await sha256(new TextEncoder().encode(plain))) !== wanted) throw new Error("manifest.json was changed after it was written");
+}
+
+const STRING = /"(?:[^"\\]|\\.)*"/y;
+const SCALAR = /[^\s,\]}]+/y;
+
+// The value of JSON text (known to be valid) at place.at, with keys sorted and no spaces; `without` is a key to leave out.
+function compact(text, place, without) {
+  const word = (pattern) => {
+    pattern.lastIndex = place.at;
+    const [found] = pattern.exec(text);
+    place.at += found.length;
+    return found;
+  };
+  const space = () => word(/\s*/y);
+  const items = (close, item) => {
+    place.at++;
+    for (space(); text[place.at] !== close; space()) {
+      if (text[place.at] === ",") place.at++;
+      space();
+      item();
+    }
+    place.at++;
+  };
+  space();
+  if (text[place.at] === "{") {
+    const pairs = new Map();
+    items("}", () => {
+      const key = word(STRING);
+      space();
+      place.at++;
+      pairs.set(key, compact(text, place));
+    });
+    if (without) pairs.delete(JSON.stringify(without));
+    const order = [...pairs].sort(([a], [b]) => (JSON.parse(a) < JSON.parse(b) ? -1 : 1));
+    return `{${order.map(([key, value]) => `${key}:${value}`).join(",")}}`;
+  }
+  if (text[place.at] === "[") {
+    const values = [];
+    items("]", () => values.push(compact(text, place)));
+    return `[${values.join(",")}]`;
+  }
+  return word(text[place.at] === '"' ? STRING : SCALAR);
+}
+
+async function sha256(content) {
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", content));
-  const got = Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
-  if (got !== wanted) throw new Error(`${name} does not have the hash that the manifest states`);
+  return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 // Inputs are { name: [data, dims] }; what does not fit the manifest is named.
@@ -54,14 +106,42 @@ export async function speak(lds, audio, ort) {
   return { frames: moved.frames.data, count, channels: moved.frames.dims[2] };
 }
 
-// 16-bit mono WAV to samples.
+// WAV of 16 bits a sample, plain or with the extended header, to mono samples (the mean of the channels).
 export function readWav(buffer, wantedRate) {
   const view = new DataView(buffer);
-  const rate = view.getUint32(24, true);
+  if (buffer.byteLength < 12 || tag(view, 0) !== "RIFF" || tag(view, 8) !== "WAVE") throw new Error("the sound is no WAV file");
+  const [header, size] = part(view, "fmt ");
+  if (size < 16) throw new Error("the sound has a damaged header");
+  const [coding, channels, bits] = [0, 2, 14].map((offset) => view.getUint16(header + offset, true));
+  const rate = view.getUint32(header + 4, true);
+  const kind = coding === 0xfffe && size >= 26 ? view.getUint16(header + 24, true) : coding;
+  if (kind !== 1 || bits !== 16) throw new Error(`the sound has ${bits} bits a sample in coding ${kind}; wanted whole numbers of 16 bits`);
+  if (channels < 1) throw new Error("the sound has no channels");
   if (rate !== wantedRate) throw new Error(`the sound has ${rate} Hz; wanted ${wantedRate} Hz`);
-  let at = 12;
-  while (view.getUint32(at, false) !== 0x64617461) at += 8 + view.getUint32(at + 4, true);
-  const samples = new Float32Array(view.getUint32(at + 4, true) / 2);
-  for (let k = 0; k < samples.length; k++) samples[k] = view.getInt16(at + 8 + 2 * k, true) / 32768;
+  const [at, bytes] = part(view, "data");
+  const samples = new Float32Array(Math.floor(bytes / (2 * channels)));
+  if (!samples.length) throw new Error("the sound holds no samples");
+  for (let k = 0; k < samples.length; k++) {
+    let sum = 0;
+    for (let c = 0; c < channels; c++) sum += view.getInt16(at + 2 * (k * channels + c), true);
+    samples[k] = sum / channels / 32768;
+  }
   return samples;
+}
+
+function tag(view, at) {
+  return String.fromCharCode(...[0, 1, 2, 3].map((k) => view.getUint8(at + k)));
+}
+
+// Where a part of the file begins, and its bytes.
+function part(view, name) {
+  for (let at = 12; at + 8 <= view.byteLength; ) {
+    const size = view.getUint32(at + 4, true);
+    if (tag(view, at) === name) {
+      if (at + 8 + size > view.byteLength) throw new Error(`the sound is truncated: its part ${name} is cut`);
+      return [at + 8, size];
+    }
+    at += 8 + size + (size % 2);
+  }
+  throw new Error(`the sound has no part ${name}: it is truncated or no WAV file`);
 }

@@ -1,4 +1,4 @@
-// An exported linear dynamical system from Node.js: node speak.mjs FOLDER speech.wav   (16-bit mono at the model's rate)
+// An exported linear dynamical system from Node.js: node speak.mjs FOLDER speech.wav   (16 bits at the model's rate)
 import { readFile } from "node:fs/promises";
 import { webcrypto } from "node:crypto";
 import * as ort from "onnxruntime-web";

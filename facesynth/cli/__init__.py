@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import signal
 import sys
+from collections.abc import Sequence
 
 import click
 
@@ -53,10 +54,18 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command line: 0 when all is well, 2 with one line for wrong input, 1 with a traceback for a bug."""
+    """Run the command line."""
+    run(cli)
+
+
+def run(command: click.Command, arguments: Sequence[str] | None = None, method: str | None = None) -> None:
+    """Run a command, possibly for models of one method alone.
+
+    It leaves with 0 when all is well, 2 with one line for wrong input, 1 with a traceback for a bug.
+    """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # being ended leaves no more behind than Ctrl-C does
     try:
-        cli.main(standalone_mode=False)
+        command.main(arguments, standalone_mode=False, obj=method)
     except FacesynthError as error:
         _leave(str(error))
     except click.ClickException as error:

@@ -136,7 +136,12 @@ def train_detector(
         clips, detector.provenance = clips_of_corpus(corpus), corpus.provenance()
     else:
         clips = clips_of_list(source)
-        detector.provenance = {"recordings": source.name, "clips": len(clips)}
+        unknown = {"licences": ["unknown"], "consents": ["unknown"]}
+        detector.provenance = {"recordings": source.name, "clips": len(clips), **unknown}
+        click.echo(
+            f"warning: {source} states no licences or consents, as a corpus does; the detector says that they are unknown",
+            err=True,
+        )
     detector.fit(clips, workers).save(output)
     facts = {"model": str(output), "method": "emotion", "recordings": len(clips), "emotions": list(detector.emotions)}
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ import click
     help="In what large constants are kept; fewer bits are smaller and less exact.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the manifest.")
-def export(model: Path, output: Path, weights: str, as_json: bool) -> None:
+@click.pass_obj
+def export(only: str | None, /, model: Path, output: Path, weights: str, as_json: bool) -> None:
     """Write MODEL as a folder that runs without torch: ONNX graphs, arrays and a manifest.
 
     The words `features` and `face` in place of a model's file write what is heard in sound, and what moves the head.
@@ -31,10 +33,12 @@ def export(model: Path, output: Path, weights: str, as_json: bool) -> None:
     from facesynth.export.parts import export_face, export_features
 
     kept: Any = weights
-    if str(model) in ("features", "face"):
+    if only in (None, str(model)) and str(model) in ("features", "face"):
         manifest = (export_features if str(model) == "features" else export_face)(output, kept)
     else:
-        manifest = export_model(model, output, kept)
+        manifest = export_model(model, output, kept, only=only)
+    if "unknown" in (*manifest["training_data"]["licences"], *manifest["training_data"]["consents"]):
+        click.echo(f"warning: {model} does not state under which licences and consents it was trained", err=True)
     if as_json:
         click.echo(json.dumps(manifest))
         return
@@ -43,3 +47,10 @@ def export(model: Path, output: Path, weights: str, as_json: bool) -> None:
         click.echo(f"{name}: differs from facesynth by at most {difference:.2g} of the largest value", err=True)
     total = sum(file["bytes"] for file in manifest["files"].values())
     click.echo(f"{output}: {manifest['method']}, {total / 1e6:.2f} MB in {len(manifest['files'])} files", err=True)
+
+
+def export_only(method: str) -> None:
+    """What the scripts under export/ run: the same for models of one method."""
+    from facesynth.cli import run
+
+    run(export, [*([method] if method in ("features", "face") else []), *sys.argv[1:]], method)

@@ -51,7 +51,7 @@ class Subject:
 
     method: str
     training_data: Mapping[str, Any]
-    """Performer, licences, consents as the corpus states them."""
+    """Performer, licences, consents as the corpus states them; the last two are "unknown" where they are missing."""
     layout: Mapping[str, Any] | None
     fps: float | None
     emotions: tuple[str, ...]
@@ -116,7 +116,7 @@ def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[
         "phones": [[phone, viseme_of(phone)] for phone in PHONES],
         "settings": dict(content.settings),
         "latency": dict(content.latency),
-        "training_data": dict(subject.training_data),
+        "training_data": {"licences": ["unknown"], "consents": ["unknown"], **subject.training_data},
     }
     return {**manifest, "sha256": digest(manifest)}
 

@@ -20,9 +20,17 @@ _CONTENTS = {
 }
 
 
-def export_model(path: str | Path, folder: str | Path, weights: Weights = "float32") -> dict[str, Any]:
-    """Write a folder that runs without torch; returns its manifest. FacesynthError where a graph is not exact enough."""
+def export_model(
+    path: str | Path, folder: str | Path, weights: Weights = "float32", *, only: str | None = None
+) -> dict[str, Any]:
+    """Write a folder that runs without torch; returns its manifest. FacesynthError where a graph is not exact enough.
+
+    only: the one method that is wanted; a model of another is refused.
+    """
     model = open_model(path)
+    name = "emotion" if isinstance(model, EmotionDetector) else model.name
+    if only not in (None, name):
+        raise FacesynthError(f"{path} holds a model of method {name!r}; wanted {only}. `facesynth export` takes any")
     if isinstance(model, EmotionDetector):
         from facesynth.export.emotion import emotion_content
 

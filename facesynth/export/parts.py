@@ -26,7 +26,8 @@ def export_features(folder: str | Path, weights: Weights = "float32") -> dict[st
     )
     latency = {"look_ahead_s": 0.0125, "about": "half a window after the frame's centre; the cepstrum is of a whole sound"}
     content = Content(graphs, {}, latency, SAMPLE_RATE)
-    return write_folder(folder, Subject("graphs", {}, None, None, ()), stored_as(content, weights))
+    data = {"performer": "none", "licences": ["none: no data"], "consents": ["none: no data"]}
+    return write_folder(folder, Subject("graphs", data, None, None, ()), stored_as(content, weights))
 
 
 def export_face(folder: str | Path, weights: Weights = "float32") -> dict[str, Any]:

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -96,6 +97,67 @@ def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
     assert np.abs(frames - expected(tmp_path / "lds", sound)).max() < 1e-2  # mm
 
 
+def wav(channels=1, bits=16, kind=1, samples=4000, rate=RATE, cut=0):
+    """A file of noise, written by hand."""
+    width = channels * bits // 8
+    head = struct.pack("<HHIIHH", kind, channels, rate, rate * width, width, bits)
+    data = np.random.default_rng(0).integers(0, 256, samples * width, np.uint8).tobytes()
+    parts = b"".join(name + struct.pack("<I", len(c)) + c for name, c in ((b"fmt ", head), (b"data", data)))
+    content = b"RIFF" + struct.pack("<I", 4 + len(parts)) + b"WAVE" + parts
+    return content[: len(content) - cut]
+
+
+def edited(folder, name, change):
+    (folder / name).write_bytes(change((folder / name).read_bytes()))
+
+
+WRONG = {
+    "manifest": (lambda f: edited(f, "manifest.json", lambda c: c.replace(b"CC0-1.0", b"MIT")), wav(), "was changed after"),
+    "fps": (lambda f: edited(f, "manifest.json", lambda c: c.replace(b'"fps": 60', b'"fps": 30')), wav(), "was changed after"),
+    "graph": (
+        lambda f: edited(f, "rollout.onnx", lambda c: c[:-1] + bytes([c[-1] ^ 1])),
+        wav(),
+        "rollout.onnx does not have the hash",
+    ),
+    "float": (None, wav(bits=32, kind=3), "32 bits a sample in coding 3"),
+    "bytes": (None, wav(bits=8), "8 bits a sample"),
+    "rate": (None, wav(rate=44100), "44100 Hz; wanted 16000"),
+    "empty": (None, wav(samples=0), "no samples"),
+    "cut": (None, wav(cut=100), "truncated"),
+    "header": (None, wav()[:30], "truncated"),
+    "text": (None, b"speech, but no sound", "no WAV file"),
+}
+
+
+def test_node_refuses_what_the_runtime_refuses(lds_file, exported, tmp_path):
+    here, node = installed("node"), shutil.which("node")
+    said = {}
+    for name, (change, sound, _) in WRONG.items():
+        folder = shutil.copytree(exported(lds_file), tmp_path / name)
+        if change:
+            change(folder)
+        (tmp_path / f"{name}.wav").write_bytes(sound)
+        command = [node, "speak.mjs", str(folder), str(tmp_path / f"{name}.wav")]
+        done = subprocess.run(command, cwd=here, check=False, capture_output=True, text=True, timeout=60)
+        said[name] = (done.returncode, done.stderr)
+    for name, (_, _, message) in WRONG.items():
+        assert said[name][0] != 0, name
+        assert message in said[name][1], (name, said[name][1])
+
+
+def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
+    from facesynth_runtime.wav import read_wav
+
+    sound, folder = tmp_path / "stereo.wav", exported(lds_file)
+    sound.write_bytes(wav(channels=2, samples=8000))
+    here = installed("node")
+    command = [shutil.which("node"), "speak.mjs", str(folder), str(sound)]
+    said = json.loads(subprocess.run(command, cwd=here, check=True, capture_output=True, text=True, timeout=60).stdout)
+    stream = load(folder).stream(noise=0.0)
+    wanted = np.concatenate([stream.push(read_wav(sound)[0]), stream.finish()])
+    assert np.abs(np.array(said["frames"]).reshape(wanted.shape) - wanted).max() < 1e-2  # mm
+
+
 class Site(http.server.SimpleHTTPRequestHandler):
     """Serves the page and takes its report."""
 
@@ -137,6 +199,7 @@ def visited(browser, site, scratch):
     threading.Thread(target=server.serve_forever, daemon=True).start()
     command = [browser, "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={scratch / 'profile'}"]
     command += ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-background-networking"]
+    command += ["--proxy-server=127.0.0.1:9", "--proxy-bypass-list=127.0.0.1"]
     command += ["--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1", f"http://127.0.0.1:{server.server_port}/index.html"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen(command, start_new_session=True, **quiet)

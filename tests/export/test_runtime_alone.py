@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import struct
 import subprocess
 import sys
 import wave
@@ -128,6 +130,62 @@ def test_the_command_line(folders, speeches, tmp_path, capsys):
     with pytest.raises(SystemExit, match="2"):
         main([str(tmp_path), str(sound)])
     assert "manifest.json: no such file" in capsys.readouterr().err
+
+
+def riff(channels=1, bits=16, kind=1, samples=4000, cut=0, rate=RATE):
+    """A WAV file of noise, written by hand."""
+    width = channels * bits // 8
+    head = struct.pack("<HHIIHH", kind, channels, rate, rate * width, width, bits)
+    if kind == 0xFFFE:
+        head += struct.pack("<HHI", 22, bits, 0) + struct.pack("<H", 1) + bytes.fromhex("000000001000800000AA00389B71")
+    data = np.random.default_rng(0).integers(0, 256, samples * width, np.uint8).tobytes()
+    parts = b"".join(name + struct.pack("<I", len(c)) + c for name, c in ((b"fmt ", head), (b"data", data)))
+    content = b"RIFF" + struct.pack("<I", 4 + len(parts)) + b"WAVE" + parts
+    return content[: len(content) - cut]
+
+
+def test_what_the_command_line_refuses(folders, tmp_path, capsys, exported, lds_file):
+    from facesynth.export.parts import export_features
+
+    lds, parts, sound, out = str(folders[0]), tmp_path / "features", tmp_path / "s.wav", ["-o", str(tmp_path / "m.npz")]
+    export_features(parts)
+    wrong = [
+        (riff(cut=501), [lds, *out], "is truncated"),
+        (riff()[:40], [lds, *out], "truncated"),
+        (riff()[:20], [lds, *out], "no part|truncated"),
+        (b"", [lds, *out], "no WAV file"),
+        (riff(samples=0), [lds, *out], "holds no samples"),
+        (riff(bits=8), [lds, *out], "has 8 bits a sample"),
+        (riff(bits=32, kind=3), [lds, *out], "in coding 3"),
+        (riff(channels=0), [lds, *out], "holds no samples|states 0 channels"),
+        (riff(), [lds, "-o", str(tmp_path / "nowhere" / "m.npz")], "there is no folder"),
+        (riff(), [lds, "-o", str(tmp_path)], "s a directory|cannot be written"),
+        (riff(), [lds], "wanted -o"),
+        (riff(), [lds, *out, "--seed", "-1"], "seed is -1"),
+        (riff(), [lds, *out, "--emotion", "bored"], "unknown emotion 'bored'"),
+        (riff(), [str(parts), *out], "holds graphs"),
+    ]
+    for content, (folder, *options), message in wrong:
+        sound.write_bytes(content)
+        with pytest.raises(SystemExit, match="2"):
+            main([folder, str(sound), *options])
+        said = capsys.readouterr().err
+        assert re.search(message, said), said
+        assert said.count("\n") == 1
+
+
+def test_the_extended_header_and_channels(folders, tmp_path, capsys):
+    frames = {}
+    for name, content in {"plain": riff(), "extended": riff(kind=0xFFFE), "stereo": riff(channels=2)}.items():
+        (tmp_path / "s.wav").write_bytes(content)
+        main([str(folders[0]), str(tmp_path / "s.wav"), "-o", str(tmp_path / f"{name}.npz")])
+        with np.load(tmp_path / f"{name}.npz") as motion:
+            frames[name] = motion["frames"]
+    assert np.array_equal(frames["plain"], frames["extended"])
+    assert frames["stereo"].shape == frames["plain"].shape
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out.startswith("facesynth-runtime ")
 
 
 def test_threads_are_at_least_one(folders):

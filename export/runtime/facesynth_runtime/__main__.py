@@ -5,20 +5,21 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import wave
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from facesynth_runtime.errors import RuntimeInputError
+from facesynth_runtime import __version__
+from facesynth_runtime.errors import RuntimeInputError, unknown
 from facesynth_runtime.load import load
-from facesynth_runtime.tracks import EmotionTrack, PhoneTrack, Speech
+from facesynth_runtime.tracks import EmotionTrack, PhoneTrack, Speech, checked_seed
+from facesynth_runtime.wav import read_wav
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Speak, or say which emotion is heard; wrong input is one line and exit code 2."""
     parser = argparse.ArgumentParser(prog="facesynth-runtime", description="Run a folder that `facesynth export` wrote.")
+    parser.add_argument("--version", action="version", version=f"facesynth-runtime {__version__}")
     parser.add_argument("folder", type=Path)
     parser.add_argument("sound", type=Path, help="16-bit WAV")
     parser.add_argument("--phones", type=Path, help="lines of `end label`, seconds; without them the sound is one silence")
@@ -37,30 +38,29 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     model = load(options.folder, threads=options.threads)
+    if not hasattr(model, "detect") and not hasattr(model, "synthesize"):
+        raise RuntimeInputError(
+            f"{options.folder} holds graphs ({', '.join(model.names)}) and no model that speaks or hears emotions"
+        )
     audio, rate = read_wav(options.sound)
     if hasattr(model, "detect"):
         print(json.dumps(model.detect(audio, rate).probabilities))
         return
     if options.output is None:
         raise RuntimeInputError("no output was named; wanted -o motion.npz")
+    if not options.output.parent.is_dir():
+        raise RuntimeInputError(f"{options.output}: there is no folder {options.output.parent}; make it first")
     phones = read_phones(options.phones, len(audio) / rate)
     emotion = options.emotion or model.emotions[0]
+    if emotion not in model.emotions:
+        raise unknown("emotion", emotion, model.emotions)
     track = EmotionTrack.constant(emotion, phones.duration_s, options.intensity)
-    motion = model.synthesize(Speech(audio, rate, phones, track), seed=options.seed)
-    np.savez(options.output, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names))
-
-
-def read_wav(path: Path) -> tuple[NDArray[np.float32], int]:
-    """Mono samples [S] (mean of the channels) and their rate."""
+    motion = model.synthesize(Speech(audio, rate, phones, track), seed=checked_seed(options.seed))
     try:
-        with wave.open(str(path), "rb") as file:
-            width, channels, rate = file.getsampwidth(), file.getnchannels(), file.getframerate()
-            content = file.readframes(file.getnframes())
-    except (OSError, EOFError, wave.Error) as error:
-        raise RuntimeInputError(f"{path}: cannot be read as WAV ({error})") from None
-    if width != 2:
-        raise RuntimeInputError(f"{path} has {8 * width} bits a sample; wanted 16")
-    return np.frombuffer(content, "<i2").reshape(-1, channels).mean(axis=1).astype(np.float32) / 32768, rate
+        with options.output.open("wb") as file:  # a path would get another ending where it has none
+            np.savez(file, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names))
+    except OSError as error:
+        raise RuntimeInputError(f"{options.output}: {error.strerror or 'cannot be written'}") from None
 
 
 def read_phones(path: Path | None, duration_s: float) -> PhoneTrack:
