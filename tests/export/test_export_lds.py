@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from facesynth_runtime import RuntimeInputError, load, resample
+from facesynth_runtime import Resampler, RuntimeInputError, load, resample
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -48,6 +48,39 @@ def test_pieces_of_any_size_give_what_the_whole_gives(pair, speeches, sizes, see
     assert abs(len(got) - len(wanted)) <= 1  # the phone track rounds seconds, the stream rounds samples
     count = min(len(got), len(wanted))
     assert difference(got[:count], wanted[:count]) < 1e-5
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    rate=st.sampled_from([8000, 11025, 16000, 22050, 44100, 48000]),
+    new_rate=st.sampled_from([16000, 22050, 8000]),
+    length=st.integers(0, 5000),
+    sizes=st.lists(st.integers(0, 900), max_size=12),
+)
+def test_resampled_pieces_are_the_resampled_whole(rate, new_rate, length, sizes):
+    sound = np.random.default_rng(length).standard_normal(length).astype(np.float32)
+    resampler, pieces, at = Resampler(rate, new_rate), [], 0
+    for size in [*sizes, length]:
+        pieces.append(resampler.push(sound[at : at + size]))
+        at += size
+        heard_s, given_s = min(at, length) / rate, sum(map(len, pieces)) / new_rate
+        assert given_s >= heard_s - resampler.look_ahead_s - 2 / min(rate, new_rate)
+    got, wanted = np.concatenate([*pieces, resampler.finish()]), resample(sound, rate, new_rate)
+    assert got.shape == wanted.shape
+    assert np.array_equal(got, wanted)
+    with pytest.raises(RuntimeInputError, match="was finished"):
+        resampler.push(sound)
+
+
+def test_sound_of_44100_hz_is_streamed(pair, speeches):
+    _, runtime = pair
+    sound = facesynth_resample(speeches[0].audio, 16000, 44100)
+    resampler, stream = Resampler(44100, 16000), runtime.stream(seed=2)
+    pieces = [stream.push(resampler.push(sound[at : at + 441])) for at in range(0, len(sound), 441)]
+    got = np.concatenate([*pieces, stream.push(resampler.finish()), stream.finish()])
+    other = runtime.stream(seed=2)
+    wanted = np.concatenate([other.push(resample(sound, 44100, 16000)), other.finish()])
+    assert difference(got, wanted) < 1e-6
 
 
 def test_one_sample_at_a_time_and_the_stated_latency(pair, speeches):

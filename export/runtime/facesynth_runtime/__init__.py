@@ -6,8 +6,19 @@
 
 from facesynth_runtime.errors import RuntimeInputError
 from facesynth_runtime.load import load
-from facesynth_runtime.sound import resample
+from facesynth_runtime.sound import Resampler, resample
 from facesynth_runtime.tracks import EmotionTrack, Layout, Motion, PhoneTrack, Speech
 
 __version__ = "0.1.0"
-__all__ = ["EmotionTrack", "Layout", "Motion", "PhoneTrack", "RuntimeInputError", "Speech", "__version__", "load", "resample"]
+__all__ = [
+    "EmotionTrack",
+    "Layout",
+    "Motion",
+    "PhoneTrack",
+    "Resampler",
+    "RuntimeInputError",
+    "Speech",
+    "__version__",
+    "load",
+    "resample",
+]

@@ -147,7 +147,10 @@ def checked_seed(seed: int) -> int:
 def checked_rate(got: float, wanted: int) -> None:
     """RuntimeInputError where sound has another rate than the one wanted."""
     if got != wanted:
-        raise RuntimeInputError(f"the sound has {got:g} Hz; wanted {wanted} Hz: bring it there with facesynth_runtime.resample")
+        raise RuntimeInputError(
+            f"the sound has {got} Hz; wanted {wanted} Hz: bring pieces there with facesynth_runtime.Resampler, whole sounds with "
+            f"resample"
+        )
 
 
 def require_open(ended: bool) -> None:
