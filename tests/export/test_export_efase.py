@@ -5,6 +5,7 @@ from facesynth_runtime import RuntimeInputError, load
 from facesynth_runtime.efase.bounds import StepBounds
 from facesynth_runtime.efase.nodes import Nodes, Query, Weights
 from facesynth_runtime.efase.search import Search
+from facesynth_runtime.efase.stream import GUARD_S
 from facesynth_runtime.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -203,13 +204,15 @@ def test_the_three_hundredth_phone_costs_what_the_tenth_does(pair, speeches, loo
 
 
 def test_frames_come_as_soon_as_stated(pair, speeches):
-    """With a look-ahead of n: n phones, the node after its own, and 0.4 s."""
+    """With a look-ahead of n: n phones, the node after its own, and the guard."""
     _, runtime = pair
+    stated = runtime.manifest["latency"]
+    assert (stated["phones_after"], stated["guard_s"]) == (1, GUARD_S)
     ends, given, stream = speeches[0].phones.ends_s, 0, runtime.stream(look_ahead=2)
     for t, (label, end_s) in enumerate(zip(speeches[0].phones.labels, ends, strict=True)):
         given += len(stream.push(label, float(end_s), "neutral"))
         if t >= 4:
-            assert given / runtime.fps >= ends[t - 4] - 0.4 - 1 / runtime.fps
+            assert given / runtime.fps >= ends[t - 4] - stated["guard_s"] - 1 / runtime.fps
 
 
 def test_a_look_ahead_costs_no_less_than_the_whole(pair, speeches):
