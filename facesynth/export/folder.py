@@ -41,6 +41,8 @@ class Content:
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     """Of the arrays."""
+    rounding: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Mean and largest error of arrays that are kept in fewer bits, in their units."""
     derived: Callable[[Mapping[str, NDArray[Any]]], Mapping[str, NDArray[Any]]] | None = None
     """More arrays, which follow from the others as they are stored."""
 
@@ -107,6 +109,7 @@ def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[
         "graphs": {graph.name: _entry(graph, parities[graph.name]) for graph in content.graphs},
         "arrays": {
             name: {"dtype": str(a.dtype), "shape": list(a.shape), "unit": content.units.get(name, "none")}
+            | ({"rounding": dict(content.rounding[name])} if name in content.rounding else {})
             for name, a in content.arrays.items()
         },
         "layout": subject.layout,

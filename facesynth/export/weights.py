@@ -36,7 +36,10 @@ def stored_as(content: Content, weights: Weights) -> Content:
         f"{name}_scale": _scale(array) for name, array in content.arrays.items() if name in SMALLER_ARRAYS and weights == "int8"
     }
     settings = {**content.settings, "stored_as": weights}
-    return replace(content, graphs=graphs, arrays={**arrays, **scales}, settings=settings)
+    rounding = {
+        name: _harm(content.arrays[name], arrays[name], scales.get(f"{name}_scale")) for name in SMALLER_ARRAYS if name in arrays
+    }
+    return replace(content, graphs=graphs, arrays={**arrays, **scales}, settings=settings, rounding=rounding)
 
 
 def _smaller(model: onnx.ModelProto, weights: Weights) -> onnx.ModelProto:
@@ -69,6 +72,13 @@ def _rounded(array: NDArray[Any], weights: Weights) -> NDArray[Any]:
     if weights == "float16":
         return array.astype(np.float16)
     return np.round(array / _scale(array)).astype(np.int8)
+
+
+def _harm(exact: NDArray[Any], kept: NDArray[Any], scale: NDArray[Any] | None) -> dict[str, float]:
+    """How far the kept numbers are from the exact ones, in the unit of the array."""
+    wide = kept.astype(np.float64) * (1.0 if scale is None else scale)
+    away = np.abs(wide - exact)
+    return {"mean": float(away.mean()), "most": float(away.max())} if away.size else {"mean": 0.0, "most": 0.0}
 
 
 def _scale(array: NDArray[Any]) -> NDArray[np.float32]:

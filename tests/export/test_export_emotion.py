@@ -73,3 +73,14 @@ def test_what_is_wrong_is_named(pair):
         runtime(np.zeros((1, 5)))
     with pytest.raises(RuntimeInputError, match="no sound was pushed"):
         runtime.stream().finish()
+
+
+@pytest.mark.parametrize(("weights", "harm", "size"), [("float16", 0.005, 0.4), ("int8", 0.25, 0.25)])
+def test_fewer_bits_are_smaller_and_the_harm_is_small(pair, emotion_file, exported, speeches, weights, harm, size):
+    exact, smaller = pair[1], load(exported(emotion_file, weights))
+    for speech in speeches:
+        wanted, got = exact.detect(speech.audio, 16000), smaller.detect(speech.audio, 16000)
+        assert got.probabilities == pytest.approx(wanted.probabilities, abs=harm)
+    sizes = [sum(path.stat().st_size for path in exported(emotion_file, kind).iterdir()) for kind in (weights, "float32")]
+    assert sizes[0] < size * sizes[1]
+    assert smaller.manifest["graphs"]["machine"]["parity"]["largest_relative_difference"] > 0

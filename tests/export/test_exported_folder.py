@@ -1,8 +1,10 @@
 import json
 import shutil
 
+import numpy as np
 import pytest
 from facesynth_runtime import RuntimeInputError, load
+from facesynth_runtime.folder import open_folder
 
 from facesynth.errors import FacesynthError
 from facesynth.export.folder import digest
@@ -205,3 +207,27 @@ def test_a_method_without_an_export_says_so(small_corpus, tmp_path):
     create("mean_face").fit(small_corpus).save(tmp_path / "mean.safetensors")
     with pytest.raises(FacesynthError, match="mean_face"):
         export_model(tmp_path / "mean.safetensors", tmp_path / "folder")
+
+
+@pytest.mark.parametrize(("weights", "mean"), [("float16", 1e-3), ("int8", 0.05)])
+def test_the_rounding_of_arrays_is_stated(anime_file, exported, weights, mean):
+    folder = exported(anime_file, weights)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    exact, kept = (open_folder(path).arrays() for path in (exported(anime_file), folder))
+    for name in ("frames", "features"):
+        scale = kept.get(f"{name}_scale", 1.0)
+        away = np.abs(kept[name].astype(np.float64) * scale - exact[name])
+        stated = manifest["arrays"][name]["rounding"]
+        assert stated == pytest.approx({"mean": away.mean(), "most": away.max()}, rel=1e-6)
+        assert 0 < stated["mean"] < mean
+    plain = json.loads((exported(anime_file) / "manifest.json").read_text())
+    assert not any("rounding" in entry for entry in plain["arrays"].values())
+    assert manifest["arrays"]["phones"].keys() == {"dtype", "shape", "unit"}
+
+
+def test_an_anime_graph_of_8_bits_moves_nearly_alike(anime_file, exported, speeches):
+    exact, smaller = load(exported(anime_file)), load(exported(anime_file, "int8"))
+    for speech in speeches:
+        wanted = exact.synthesize(speech).frames
+        moved = np.abs(wanted - wanted.mean(axis=0)).max()
+        assert np.abs(smaller.synthesize(speech).frames - wanted).mean() < 0.02 * moved
