@@ -19,6 +19,7 @@ from facesynth.corpus.problem import Problem
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import read_motion
 from facesynth.errors import FacesynthError
+from facesynth.motion.layout import Layout
 from facesynth.motion.lips import lip_gap
 from facesynth.motion.motion import Motion
 from facesynth.progress import track
@@ -75,7 +76,7 @@ def sync_problems(files: Files, header: Header, records: Iterable[Record]) -> It
     curve = np.mean([correlations(np.log(np.exp(pair.heard).sum(axis=1)), pair.opening) for pair in pairs], axis=0)
     shift_s = float(LAGS[curve.argmax()]) / RATE
     clear = curve.max() - curve[len(LAGS) // 2] >= max(CLEAR / 3, CLEAR_ALONE / len(pairs))
-    peaks = len(pairs) >= FEWEST or 0 < curve.argmax() < len(LAGS) - 1
+    peaks = len(pairs) >= FEWEST or (_shows_opening(header.layout) and 0 < curve.argmax() < len(LAGS) - 1)
     shifted = abs(shift_s) >= SHARED_S and clear and peaks
     if shifted:
         whose = "in all recordings the mouth" if len(pairs) > 1 else "the mouth"
@@ -127,12 +128,26 @@ def mouth_opening(motion: Motion) -> Floats:
     if layout.dimension > 1 and ("lower_lip" in layout.groups or "jaw" in layout.groups):
         group = layout.group("lower_lip" if "lower_lip" in layout.groups else "jaw")
         return -motion.points[:, group, 1].mean(axis=1).astype(np.float64)
-    folded = ["".join(letter for letter in name.lower() if letter.isalnum()) for name in layout.names]
-    jaws = [column for column, name in enumerate(folded) if any(jaw in name for jaw in JAWS)]
-    if layout.dimension == 1 and jaws:
+    jaws = _jaws(layout)
+    if jaws:
         return motion.frames[:, jaws].mean(axis=1).astype(np.float64)
     columns = layout.columns("mouth") if "mouth" in layout.groups else np.arange(layout.channels)
     return np.linalg.norm(motion.frames[:, columns] - np.nanmedian(motion.frames[:, columns], axis=0), axis=1).astype(np.float64)
+
+
+def _shows_opening(layout: Layout) -> bool:
+    """Whether `mouth_opening` is more than any movement, which rises when a mouth opens and when it shuts."""
+    if layout.dimension == 1:
+        return bool(_jaws(layout))
+    return bool(layout.lip_pairs) or "lower_lip" in layout.groups or "jaw" in layout.groups
+
+
+def _jaws(layout: Layout) -> list[int]:
+    """Curves that tell how far the mouth is open."""
+    if layout.dimension > 1:
+        return []
+    folded = ["".join(letter for letter in name.lower() if letter.isalnum()) for name in layout.names]
+    return [column for column, name in enumerate(folded) if any(jaw in name for jaw in JAWS)]
 
 
 def _pair(files: Files, header: Header, record: Record) -> Pair | None:

@@ -32,7 +32,7 @@ def draw_all(corpus: Corpus, folder: str | Path) -> tuple[Path, ...]:
 
 
 def draw(utterance: Utterance, path: str | Path) -> None:
-    """Draw one recording as PNG: sound above, phones in the middle (p, b and m in red), opening of the mouth below."""
+    """Draw one recording as PNG: sound above, phones in the middle (p, b and m red, underlined), opening of the mouth below."""
     try:
         from PIL import Image, ImageDraw
 
@@ -52,6 +52,8 @@ def draw(utterance: Utterance, path: str | Path) -> None:
         pen.line([(right, top), (right, bottom)], fill=LIGHT)
         if label != SILENCE:
             colour = RED if label in LIPS_MEET else INK
+            if label in LIPS_MEET:
+                pen.line([(left, bottom), (right, bottom)], fill=RED, width=3)
             pen.text(((left + right) / 2, top + WAVE + LABELS / 2), label, fill=colour, font=font, anchor="mm")
     for x, (low, high) in enumerate(_envelope(utterance, image.width - 2 * MARGIN)):
         middle = top + WAVE / 2
