@@ -59,6 +59,8 @@ def test_what_cannot_be_heard(tmp_path, hum):
     save_wav(tmp_path / "short.wav", np.ones(160, np.float32), 16000)
     save_wav(tmp_path / "silent.wav", np.zeros(16000, np.float32), 16000)
     with pytest.raises(FacesynthError, match="10 ms"):
+        hear(tmp_path / "short.wav", text="Oh")
+    with pytest.raises(FacesynthError, match="give the phones of this sound"):
         hear(tmp_path / "short.wav", phones_path=tmp_path / "a.lab")
     with pytest.raises(FacesynthError, match="silent"):
         hear(tmp_path / "silent.wav", phones_path=tmp_path / "a.lab")
