@@ -26,6 +26,15 @@ GUARD_S = 0.4
 """Of settled motion after a frame, beyond which nothing changes it."""
 
 
+LATENCY = {
+    "look_ahead_s": None,
+    "phones_after": 1,
+    "guard_s": GUARD_S,
+    "about": "a stretch between silences is searched as a whole; with look_ahead=n a node is settled n phones later. A "
+    "frame is final when n + phones_after more phones are known and guard_s of motion, as far as smoothing reaches",
+}
+
+
 def efase_content(model: Efase) -> Content:
     """Everything that the runtime needs of a trained database."""
     weights, unit = model.weights(), model.fitted_layout.unit
@@ -73,13 +82,7 @@ def efase_content(model: Efase) -> Content:
             **soft,
         },
         sample_rate=LogMel().sample_rate if graphs else None,
-        latency={
-            "look_ahead_s": None,
-            "phones_after": 1,
-            "guard_s": GUARD_S,
-            "about": "a stretch between silences is searched as a whole; with look_ahead=n a node is settled n phones later. A "
-            "frame is final when n + phones_after more phones are known and guard_s of motion, as far as smoothing reaches",
-        },
+        latency=LATENCY,
         arrays=arrays,
         derived=bounds,
         units={

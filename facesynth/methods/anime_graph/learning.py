@@ -23,7 +23,7 @@ from facesynth.methods.anime_graph.candidates import stretched_motions
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import lay_steps
 from facesynth.methods.anime_graph.soft import step_terms
-from facesynth.methods.efase.descent import Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.efase.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.efase.sharpening import matching_share
 from facesynth.methods.efase.soft import posterior
 from facesynth.progress import track
@@ -31,26 +31,6 @@ from facesynth.progress import track
 NUMBERS = ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")
 CANDIDATES = 80
 """Nodes of each phone that take part in learning; synthesis knows no such limit."""
-
-
-@dataclass(frozen=True)
-class Learned:
-    """What learning found."""
-
-    settings: dict[str, float]
-    """Settings of `AnimeGraph`."""
-    errors: tuple[float, ...]
-    """Validation error before learning and after each round, squared unit of the layout, mean over channels."""
-
-    @property
-    def improvement(self) -> float:
-        """Share of the validation error that learning took away."""
-        return 1 - min(self.errors) / self.errors[0]
-
-    @property
-    def account(self) -> dict[str, Any]:
-        """What a trained model remembers of it."""
-        return {"rounds": len(self.errors) - 1, "improvement": self.improvement, "settings": self.settings}
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,8 @@ Sentences are parted in three: the database, those to learn from, and those that
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -28,6 +29,26 @@ PATIENCE = 4
 """Rounds without a better validation error before learning stops."""
 
 Example = TypeVar("Example")
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What learning found."""
+
+    settings: dict[str, float]
+    """Settings of the method."""
+    errors: tuple[float, ...]
+    """Validation error before learning and after each round, squared unit of the layout."""
+
+    @property
+    def improvement(self) -> float:
+        """Share of the validation error that learning took away."""
+        return 1 - min(self.errors) / self.errors[0]
+
+    @property
+    def account(self) -> dict[str, Any]:
+        """What a trained model remembers of it."""
+        return {"rounds": len(self.errors) - 1, "improvement": self.improvement, "settings": self.settings}
 
 
 class Logs:

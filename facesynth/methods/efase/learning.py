@@ -21,7 +21,7 @@ from facesynth.corpus import Corpus, Utterance
 from facesynth.errors import FacesynthError
 from facesynth.methods.efase.audio import pose_distances
 from facesynth.methods.efase.costs import Query, target_costs
-from facesynth.methods.efase.descent import Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.efase.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.penalty import median_transition
@@ -36,25 +36,11 @@ NUMBERS = ("pnt", "alpha", "beta", "eta", "gamma", "delta", "phi", "audio_weight
 
 
 @dataclass(frozen=True)
-class Learned:
-    """What learning found."""
+class LearnedMetrics(Learned):
+    """What learning found, with a factor for each component."""
 
-    settings: dict[str, float]
-    """Settings of `Efase`."""
     sound_metric: tuple[float, ...]
     pose_metric: tuple[float, ...]
-    errors: tuple[float, ...]
-    """Validation error before learning and after each round, squared unit of the layout, summed over the markers."""
-
-    @property
-    def improvement(self) -> float:
-        """Share of the validation error that learning took away."""
-        return 1 - min(self.errors) / self.errors[0]
-
-    @property
-    def account(self) -> dict[str, Any]:
-        """What a trained model remembers of it."""
-        return {"rounds": len(self.errors) - 1, "improvement": self.improvement, "settings": self.settings}
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +82,7 @@ def logs_of(model: Efase) -> Logs:
     return Logs(numbers, {"sound": sound, "pose": pose})
 
 
-def learn(corpus: Corpus, settings: dict[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> Learned:
+def learn(corpus: Corpus, settings: dict[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> LearnedMetrics:
     """Learn on sentences that the database does not have; `pull` weighs the way from the start against the relative error.
 
     `settings` are those of `Efase`, with a temperature above 0. A sharpening above 0 is learned as well.
@@ -177,17 +163,17 @@ def _place(model: Efase, query: Query, t: int, chosen: Ints, sound: Floats | Non
     return Place(*(torch.from_numpy(np.asarray(array, np.float64)) for array in arrays))
 
 
-def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> Learned:
+def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetrics:
     """Numbers in the settings' own units: PNT, temperature and audio weight over the median transition under the new weights."""
     numbers = logs.found()
     cost = {name: numbers[name] for name in ("alpha", "beta", "eta", "gamma", "delta", "phi")}
     median = median_transition(model.nodes(), replace(model.weights(), pnt=1.0, **cost))
     scaled = {"penalty": "pnt", "audio_weight": "audio_weight", "temperature": "temperature"}
     settings = cost | {key: numbers[name] / median for key, name in scaled.items()} | {"pose_weight": numbers["pose_weight"]}
-    return Learned(settings, tuple(logs.factor("sound").tolist()), tuple(logs.factor("pose").tolist()), errors)
+    return LearnedMetrics(settings, errors, tuple(logs.factor("sound").tolist()), tuple(logs.factor("pose").tolist()))
 
 
-def _sharpening(model: Efase, learned: Learned, held_out: Corpus) -> float:
+def _sharpening(model: Efase, learned: LearnedMetrics, held_out: Corpus) -> float:
     """What the model needs, as it has been learned, to move as quickly as the recordings of sentences it does not know."""
     model = model.with_weights(**learned.settings, sharpening=0.0)
     model.audio.count_by(learned.sound_metric, learned.pose_metric)
