@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE, normalise_phone, viseme_of
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import Alignment, align
 from facesynth.speech.audio import load_audio
-from facesynth.speech.phones import SILENCE, normalise_phone, viseme_of
 from facesynth.speech.recognition import recognise
 from facesynth.speech.segments import phone_track
-from facesynth.speech.speech import PhoneTrack
 
 STATEMENTS = {"01": "Kids are talking by the door", "02": "Dogs are sitting by the door"}
 OTHERS = (

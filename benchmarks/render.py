@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from facesynth.face.raster import FAR, bin_triangles, draw_depth, vertex_normals
-from facesynth.face.render import Renderer, available_cores
-from facesynth.face.rig import load_head, pose
+from facesynth.face.draw.raster import FAR, bin_triangles, draw_depth, vertex_normals
+from facesynth.face.draw.render import Renderer, available_cores
+from facesynth.face.rig.rig import load_head, pose
 
 SIZE = (1280, 720)
 

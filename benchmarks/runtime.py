@@ -15,18 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
+from facesynth.inference import EmotionTrack, FacesynthError, PhoneTrack, Speech, load, resample
+from facesynth.inference.__main__ import read_wav
 from facesynth.speech.textgrid import read_textgrid
-
-RUNTIME = Path(__file__).parents[1] / "export" / "runtime"
-sys.path.insert(0, str(RUNTIME))
-
-from facesynth_runtime import EmotionTrack, PhoneTrack, RuntimeInputError, Speech, load, resample  # noqa: E402
-from facesynth_runtime.__main__ import read_wav  # noqa: E402
 
 STARTS, REPEATS = 7, 3
 """The best of them counts: other work on the machine only ever adds."""
-START = "import sys, time; began = time.perf_counter(); sys.path.insert(0, sys.argv[1]); from facesynth_runtime import load; "
-START += "load(sys.argv[2]); print(time.perf_counter() - began, time.process_time())"
+START = "import sys, time; began = time.perf_counter(); from facesynth.inference import load; "
+START += "load(sys.argv[1]); print(time.perf_counter() - began, time.process_time())"
 
 
 def main() -> None:
@@ -99,7 +95,7 @@ def told_pair(pair) -> str:
 
 def started(folder) -> tuple[float, float]:
     """Seconds from nothing imported to a model that is ready, by the clock and of the processor."""
-    command = [sys.executable, "-c", START, str(RUNTIME), str(folder)]
+    command = [sys.executable, "-c", START, str(folder)]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     return float(said[0]), float(said[1])
 
@@ -133,7 +129,7 @@ def streaming(model, speech) -> str:
         return told("10 ms of sound a piece", late, longest)
     try:
         stream, given, at = model.stream(look_ahead=4), 0, 0
-    except RuntimeInputError:
+    except FacesynthError:
         return "whole utterances"
     for label, end_s in zip(speech.phones.labels, speech.phones.ends_s.tolist(), strict=True):
         began = time.perf_counter()

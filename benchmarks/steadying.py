@@ -18,7 +18,7 @@ from facesynth.capture.shape import in_mm
 from facesynth.capture.steady import steadied
 from facesynth.capture.track import Track
 from facesynth.corpus import Corpus
-from facesynth.corpus.recordings import VIDEO
+from facesynth.corpus.add.recordings import VIDEO
 from facesynth.motion.pose import remove_head
 from facesynth.speech.textgrid import read_textgrid
 

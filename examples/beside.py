@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from facesynth.capture.points.footage import read_footage
 from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos
+from facesynth.face.draw.video import write_video
 from facesynth.face.texture.compose import Report
-from facesynth.face.video import write_video
-from facesynth.likeness import likeness, speaker_of
 from facesynth.methods.lds.method import LDS
+from facesynth.stage.likeness import likeness, speaker_of
 
 
 def main() -> None:

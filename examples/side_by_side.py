@@ -18,12 +18,12 @@ from facesynth.capture.kept_tracks import kept_track
 from facesynth.capture.motion import motion_of
 from facesynth.capture.points.footage import read_footage
 from facesynth.corpus import Corpus
+from facesynth.face.draw.video import read_video, write_video
 from facesynth.face.files.npz import read_npz
-from facesynth.face.markers import LipGap
-from facesynth.face.rig import load_head
-from facesynth.face.video import read_video, write_video
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.markers import LipGap
+from facesynth.face.rig.rig import load_head
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
 from facesynth.speech.audio import load_audio
 
 Picture = NDArray[np.uint8]

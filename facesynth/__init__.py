@@ -1,3 +1,5 @@
 """Talking, feeling faces driven by speech, learned from recordings of one performer."""
 
-__version__ = "0.1.0"
+from facesynth.inference.version import __version__
+
+__all__ = ["__version__"]

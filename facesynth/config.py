@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 def load_config(path: str | Path) -> dict[str, Any]:

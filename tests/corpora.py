@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.corpus import Corpus, Record
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
 RATE = 16000

@@ -9,15 +9,17 @@ import facesynth
 
 ROOT = Path(facesynth.__file__).parent
 BELOW = {
-    "speech": set(),
-    "motion": set(),
-    "corpus": {"speech", "motion", "capture"},
-    "face": {"speech", "motion"},
-    "capture": {"speech", "motion"},
-    "methods": {"speech", "motion", "corpus", "face"},
-    "performer": {"speech", "motion", "corpus", "face"},
-    "evaluation": {"speech", "motion", "corpus", "face", "methods"},
-    "export": {"speech", "motion", "face", "methods"},
+    "inference": set(),
+    "speech": {"inference"},
+    "motion": {"inference"},
+    "corpus": {"inference", "speech", "motion", "capture"},
+    "face": {"inference", "speech", "motion"},
+    "capture": {"inference", "speech", "motion"},
+    "methods": {"inference", "speech", "motion", "corpus", "face"},
+    "performer": {"inference", "speech", "motion", "corpus", "face"},
+    "evaluation": {"inference", "speech", "motion", "corpus", "face", "methods"},
+    "export": {"inference", "speech", "motion", "face", "methods"},
+    "stage": {"inference", "speech", "motion", "corpus", "capture", "face", "methods"},
 }
 """What a room may import; the command line may import everything."""
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from facesynth.capture.models import MODELS, _kept
-from facesynth.face.video import read_video
+from facesynth.face.draw.video import read_video
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.geometry import lve, marker_error
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
 from facesynth.methods.anime_graph.report import MapTrial

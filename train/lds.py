@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
-from facesynth.likeness import save_face
+from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
-from facesynth.speech.speech import Speech
+from facesynth.stage.likeness import save_face
 
 CONFIG = Path(__file__).parents[1] / "configs" / "lds.yaml"
 

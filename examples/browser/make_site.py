@@ -11,8 +11,8 @@ import numpy as np
 from facesynth.export.face import mesh_deformation_graph
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.models import export_model
-from facesynth.face.markers import marker_layout
-from facesynth.face.rig import PARTS, Rig, load_head
+from facesynth.face.rig.markers import marker_layout
+from facesynth.face.rig.rig import PARTS, Rig, load_head
 from facesynth.speech.audio import load_audio, resample, save_wav
 
 RATE = 16000

@@ -10,9 +10,9 @@ from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import correlate
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import missing_in
-from facesynth.motion.motion import Motion
 
 Floats = NDArray[np.float64]
 

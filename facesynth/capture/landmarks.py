@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.capture.tracker import POINTS
-from facesynth.motion.layout import Layout
+from facesynth.inference.layout import Layout
 
 NAMES = tuple(f"p{number:03d}" for number in range(POINTS))
 

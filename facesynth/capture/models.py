@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
     import onnxruntime

@@ -9,9 +9,9 @@ from facesynth.capture.landmarks import is_captured
 from facesynth.capture.shape import in_mm
 from facesynth.capture.steady import steadied
 from facesynth.capture.track import Track
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 from facesynth.motion.pose import remove_head, rigid_points
 
 

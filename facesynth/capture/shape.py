@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from facesynth.capture.landmarks import LIP_PAIRS, OUTER_CORNERS, OUTER_CORNERS_MM, RIGID
 from facesynth.capture.track import Track
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pose import remove_head
 
 Floats = NDArray[np.float64]

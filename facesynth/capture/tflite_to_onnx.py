@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 OPSET = 17
 _DTYPES = {0: np.float32, 1: np.float16, 2: np.int32, 4: np.int64}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from facesynth.capture.square import Image
 from facesynth.capture.tracker import POINTS, Seen, Tracker
 from facesynth.capture.video import open_video
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 LONGEST_S = 3600.0
 FEWEST_FRAMES = 5

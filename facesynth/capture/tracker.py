@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from facesynth.capture.detection import Detector, Face
 from facesynth.capture.models import session
 from facesynth.capture.square import Image, Square
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 POINTS = 468
 MESH_PIXELS, IRIS_PIXELS = 192, 64

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from facesynth.capture.square import Image
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from av.container import InputContainer

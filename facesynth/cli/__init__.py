@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import click
 
 from facesynth import __version__
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 VERBS = {
     "demo": ("facesynth.cli.demo:demo", "Built-in performer: corpus, training, speech, video."),

@@ -19,7 +19,7 @@ from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_file
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
-    from facesynth.corpus.add import AddReport
+    from facesynth.corpus.add.add import AddReport
     from facesynth.corpus.workers import Engine, Workers
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
@@ -153,7 +153,7 @@ def add(
     Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated; added
     again, only what was given otherwise than before is done anew. FOLDER/import.csv says what was used, what not, and why.
     """
-    from facesynth.corpus.add import add as add_recordings
+    from facesynth.corpus.add.add import add as add_recordings
     from facesynth.corpus.importers.recorder import cut_for
     from facesynth.corpus.record import read_listed
 
@@ -227,7 +227,7 @@ def align(folder: Path, ids: tuple[str, ...], force: bool, workers: Workers, as_
 @as_json
 def check(folder: Path, as_json: bool) -> None:
     """Say everything that is wrong with a corpus; exit code 2 where something grave is."""
-    from facesynth.corpus.check import check as check_corpus
+    from facesynth.corpus.checks.check import check as check_corpus
 
     problems = check_corpus(folder)
     grave = sum(problem.grave for problem in problems)
@@ -307,7 +307,7 @@ def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> di
 
 def _words(about: Mapping[str, Any], text: str | None, text_file: Path | None) -> tuple[dict[str, Any], dict[str, str] | None]:
     """What is known of every recording, with the text of the one that is added; and a table of the texts of many."""
-    from facesynth.corpus.transcripts import read_transcripts
+    from facesynth.corpus.add.transcripts import read_transcripts
 
     is_table = text_file is not None and text_file.suffix.lower() == ".csv"
     said = text or (_read_text(text_file) if text_file and not is_table else None)
@@ -317,7 +317,7 @@ def _words(about: Mapping[str, Any], text: str | None, text_file: Path | None) -
 
 def _told(corpus: Corpus, report: AddReport) -> list[str]:
     """What a person reads after an import."""
-    from facesynth.corpus.account import account_path, phones_from
+    from facesynth.corpus.add.account import account_path, phones_from
 
     counts = {
         "added": len(report.added),
@@ -345,7 +345,7 @@ def _counted(counts: Mapping[str, int]) -> str:
 
 
 def _read_text(path: Path) -> str:
-    from facesynth.errors import FacesynthError
+    from facesynth.inference.errors import FacesynthError
 
     try:
         return " ".join(path.read_text(encoding="utf-8-sig").split())
@@ -367,7 +367,7 @@ def _remarks(remarks: Mapping[str, Iterable[str]]) -> list[str]:
 
 def _leave_if_nothing(nothing: bool, reasons: Mapping[str, str], what: str) -> None:
     """One clear error where a command could do nothing at all."""
-    from facesynth.errors import FacesynthError
+    from facesynth.inference.errors import FacesynthError
 
     if nothing and reasons:
         name, reason = next(iter(reasons.items()))

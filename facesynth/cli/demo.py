@@ -12,10 +12,10 @@ import click
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
-    from facesynth.face.rig import Rig
+    from facesynth.face.rig.rig import Rig
+    from facesynth.inference.speech import Speech
     from facesynth.methods.method import Method
-    from facesynth.speaking import Performance
-    from facesynth.speech.speech import Speech
+    from facesynth.stage.performance import Performance
 
 
 class Clock:
@@ -51,9 +51,9 @@ def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
     from facesynth.cli.speak import parse_size
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.rig import load_head
     from facesynth.performer.build import build_performer
-    from facesynth.speaking import Stage, perform, write_performance
+    from facesynth.stage.performance import Stage, perform, write_performance
 
     pixels = parse_size(size)
     clock = Clock()
@@ -81,8 +81,8 @@ def _strip(path: Path, performance: Performance, rig: Rig) -> Path:
     from PIL import Image
 
     from facesynth.atomic import atomic_path
-    from facesynth.face.render import Renderer
-    from facesynth.speaking import picture
+    from facesynth.face.draw.render import Renderer
+    from facesynth.stage.performance import picture
 
     animation, track = performance.animation, performance.speech.emotions
     renderer = Renderer(rig, (480, 540))
@@ -118,8 +118,8 @@ def _speech(seed: int) -> Speech:
 
     from facesynth import __version__
     from facesynth.cache import cache_dir
+    from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
     from facesynth.performer.lines import DEMO_LINES
-    from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
     made_of = json.dumps([__version__, DEMO_LINES, seed])
     path = cache_dir("models") / f"demo-speech-{sha256(made_of.encode()).hexdigest()[:16]}.npz"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,10 +80,10 @@ def _read(
     span: tuple[float, float] | None,
     output: Path | None,
 ) -> dict[str, Any]:
+    from facesynth.inference.speech import EmotionTrack
     from facesynth.methods.emotion.detector import track_of
     from facesynth.speech.audio import load_audio, require_sound
     from facesynth.speech.emotions import write_emotions
-    from facesynth.speech.speech import EmotionTrack
 
     audio, rate = load_audio(path)
     require_sound(audio, rate)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 import numpy as np
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
+    from facesynth.inference.motion import Motion
+    from facesynth.inference.speech import EmotionTrack, Speech
     from facesynth.methods.anime_graph.method import AnimeGraph
     from facesynth.methods.emotion.detector import EmotionDetector
     from facesynth.methods.method import Method
-    from facesynth.motion.motion import Motion
-    from facesynth.speech.speech import EmotionTrack, Speech
 
 AUTO = "auto"
 BESIDE = "emotion.safetensors"
@@ -76,8 +76,8 @@ def _detector(path: Path | None, model: Path) -> EmotionDetector:
 
 def _heard(speech: Speech, detector: EmotionDetector, known: list[str], *, along: bool) -> EmotionTrack:
     """Emotions that both detector and model know; of the others, the most probable known one stands in."""
+    from facesynth.inference.speech import EmotionTrack
     from facesynth.methods.emotion.detector import track_of
-    from facesynth.speech.speech import EmotionTrack
 
     if along:
         ends_s, probabilities = detector.along(speech.audio, speech.sample_rate)

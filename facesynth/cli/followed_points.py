@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
-    from facesynth.corpus.add import AddReport
+    from facesynth.corpus.add.add import AddReport
 
 
 def from_points(
@@ -46,8 +46,8 @@ def keep_videos_of(corpus: Corpus, files: Iterable[Path], report: AddReport, utt
 
     if not is_tracked(corpus.layout):
         return
+    from facesynth.corpus.add.recordings import VIDEO, find_recordings
     from facesynth.corpus.importers.points import forget_videos, keep_videos
-    from facesynth.corpus.recordings import VIDEO, find_recordings
 
     ids = {*report.added, *report.changed, *report.unchanged}
     videos = {utterance_id or r.name: r.motion for r in find_recordings(files)[0] if r.motion.suffix.lower() in VIDEO}

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.corpus.importers.description import Description
     from facesynth.corpus.workers import Workers
-    from facesynth.motion.layout import Layout
+    from facesynth.inference.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Said:
         self, folder: Path, files: Iterable[Path], header: Mapping[str, Any], workers: Workers
     ) -> tuple[Corpus, tuple[str, ...]] | None:
         """A new corpus that fits the motion files among recordings, and what was guessed; None where most are videos."""
+        from facesynth.corpus.add.recordings import VIDEO, find_recordings
         from facesynth.corpus.importers.session import corpus_from_files
-        from facesynth.corpus.recordings import VIDEO, find_recordings
 
         motions = [recording.motion for recording in find_recordings(files)[0]]
         mocap = [path for path in motions if path.suffix.lower() not in VIDEO]
@@ -46,7 +46,7 @@ class Said:
 
     def require_nothing(self) -> None:
         """FacesynthError where the corpus is there: what its files are was said when it was made."""
-        from facesynth.errors import FacesynthError
+        from facesynth.inference.errors import FacesynthError
 
         if self != Said():
             raise FacesynthError(
@@ -79,7 +79,7 @@ def said_of_files(command: Any) -> Any:
 def read_layout(path: Path) -> Layout:
     """The layout of a layout file."""
     from facesynth.corpus.importers.description import read_description
-    from facesynth.errors import FacesynthError
+    from facesynth.inference.errors import FacesynthError
 
     layout = read_description(path).layout
     if layout is None:

@@ -11,9 +11,9 @@ import click
 import numpy as np
 
 if TYPE_CHECKING:
-    from facesynth.face.own_head import OwnHead
+    from facesynth.face.rig.own_head import OwnHead
+    from facesynth.inference.motion import Motion
     from facesynth.methods.method import Method
-    from facesynth.motion.motion import Motion
 
 Change = Callable[["Motion"], "Motion"]
 
@@ -37,7 +37,7 @@ def own_head(options: dict[str, Any]) -> OwnHead | None:
     """The head that was asked for."""
     if options["rig"] is None:
         return None
-    from facesynth.face.own_head import load_own_head
+    from facesynth.face.rig.own_head import load_own_head
 
     return load_own_head(options["rig"], options["mapping"])
 
@@ -50,9 +50,9 @@ def as_arkit(method: Method, own: OwnHead | None, options: dict[str, Any], chang
     is_own = layout is not None and layout.kind == "curves" and not arkit_columns(layout)
     if options["mapping"] is None or not is_own or (own is not None and set(own.names) <= set(layout.names)):
         return change
-    from facesynth.face.channel_map import ChannelMap, read_mapping
-    from facesynth.face.rig import ARKIT_NAMES
-    from facesynth.motion.layout import Layout
+    from facesynth.face.rig.channel_map import ChannelMap, read_mapping
+    from facesynth.face.rig.rig import ARKIT_NAMES
+    from facesynth.inference.layout import Layout
 
     given = read_mapping(options["mapping"]).channels
     channel_map = ChannelMap.of(layout.names, {name: channel for name, channel in given.items() if name in layout.names})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 AUDIO_SUFFIXES = (
     ".wav", ".flac", ".ogg", ".mp3", ".m4a", ".aac", ".aiff", ".aif", ".opus", ".mp4", ".mov", ".mkv", ".mpg", ".avi",

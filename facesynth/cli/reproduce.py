@@ -33,8 +33,8 @@ def reproduce(
     """
     from facesynth.atomic import write_text
     from facesynth.corpus import Corpus
-    from facesynth.errors import unknown
     from facesynth.evaluation.papers import reproduce as run
+    from facesynth.inference.errors import unknown
 
     if output and output.suffix not in (".md", ".csv", ".json"):
         raise unknown("output type", output.suffix or str(output), (".md", ".csv", ".json"))

@@ -14,7 +14,7 @@ from facesynth.cli.feeling import AUTO, account, asks_to_listen, feeling_options
 from facesynth.cli.own_rig import as_arkit, own_head, own_rig_options
 from facesynth.cli.recordings import recordings
 from facesynth.cli.targets import plan_targets, require_free, write_phones
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
     from facesynth.methods.anime_graph.method import AnimeGraph
@@ -115,7 +115,7 @@ def speak(*, model: Path, speech: tuple[Path, ...], as_json: bool, **options: An
     A transcript (clip.txt) or phones (clip.TextGrid) beside a sound file are used where none are given.
     """
     from facesynth.methods.registry import load
-    from facesynth.speaking import check_output
+    from facesynth.stage.performance import check_output
 
     outputs = [check_output(path) for path in options["outputs"]]
     paths = recordings(speech)
@@ -170,9 +170,9 @@ def _check_feeling(method: Method, options: dict[str, Any]) -> None:
 
 def _speak_one(method: Method, path: Path, targets: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
     from facesynth.atomic import write_text
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.rig import load_head
     from facesynth.motion.planar import is_tracked
-    from facesynth.speaking import Stage, perform, write_performance
+    from facesynth.stage.performance import Stage, perform, write_performance
 
     heard = _hear(path, method, options)
     for warning in heard.warnings:
@@ -205,7 +205,7 @@ def _show_likeness(
 ) -> dict[str, Any]:
     """The speaker's real face, for a model of points followed in video; at the rate and size of the speaker's pictures."""
     from facesynth.corpus.signals import write_motion
-    from facesynth.likeness import load_face, write_likeness
+    from facesynth.stage.likeness import load_face, write_likeness
 
     for target in targets:
         if target.suffix.lower() not in (".mp4", ".npz"):

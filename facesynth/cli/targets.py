@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.speech.hearing import Heard

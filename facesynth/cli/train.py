@@ -50,8 +50,8 @@ def train(
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
-    from facesynth.likeness import save_face
     from facesynth.methods.registry import create
+    from facesynth.stage.likeness import save_face
 
     chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
     if method == "emotion":
@@ -103,7 +103,7 @@ def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_alone(method: str, workers: Workers) -> None:
     from facesynth.corpus.workers import ALONE
-    from facesynth.errors import FacesynthError
+    from facesynth.inference.errors import FacesynthError
 
     if workers != ALONE:
         raise FacesynthError(
@@ -113,7 +113,7 @@ def _require_alone(method: str, workers: Workers) -> None:
 
 def _require_speech(recordings: Corpus) -> None:
     """FacesynthError, with the reasons, where no recording is usable."""
-    from facesynth.errors import FacesynthError
+    from facesynth.inference.errors import FacesynthError
 
     if not len(recordings) and recordings.records:
         reasons = list(dict.fromkeys(record.reason or "marked unusable" for record in recordings.records))

@@ -12,7 +12,7 @@ from facesynth.corpus.files import Files
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_file
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import load_audio
 from facesynth.speech.textgrid import write_textgrid
 

@@ -29,13 +29,13 @@ from facesynth.corpus.signals import (
 )
 from facesynth.corpus.splits import fold_ids, split_ids
 from facesynth.corpus.utterance import Utterance
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import PHONES
+from facesynth.inference.speech import Speech
 from facesynth.motion.gaps import GapReport
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.phones import PHONES
 from facesynth.speech.segments import Segment
-from facesynth.speech.speech import Speech
 from facesynth.speech.textgrid import read_textgrid
 
 LOCK_TIMEOUT_S = 60.0

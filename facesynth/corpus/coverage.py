@@ -10,8 +10,8 @@ from pathlib import Path
 
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.record import plain_words
-from facesynth.errors import FacesynthError
-from facesynth.speech.phones import SILENCE
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
 from facesynth.speech.pronunciation import pronounce
 from facesynth.speech.textgrid import read_textgrid
 from facesynth.speech.transcript import words_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.gaps import runs
 
 NO_SPEECH = "no speech: there is no sound; kept for eyes and blinks"

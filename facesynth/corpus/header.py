@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 
 from facesynth.atomic import write_text
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 FORMAT = 1
 """Version of the folder's format; a corpus of another version is refused."""

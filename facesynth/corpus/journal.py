@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import write_text
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 ADDED = "+"
 

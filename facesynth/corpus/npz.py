@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 LARGEST_BYTES = 2**31
 ARRAYS = ("frames", "head", "eyes", "fps")

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
-from facesynth.corpus.check_sync import mouth_opening
+from facesynth.corpus.checks.sync import mouth_opening
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.utterance import Utterance
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
 from facesynth.progress import track
-from facesynth.speech.phones import SILENCE
 
 WIDTH_PER_S, MARGIN, WAVE, LABELS, MOUTH = 320, 12, 110, 46, 150
 INK, GREY, LIGHT, RED, BLUE = "#202428", "#8a9096", "#e4e7ea", "#c2452d", "#2d6fc2"

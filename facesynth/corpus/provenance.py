@@ -11,7 +11,7 @@ from facesynth.corpus.files import Files
 from facesynth.corpus.header import FORMAT, Header
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_file
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 def provenance(files: Files, header: Header, records: Iterable[Record]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any, Literal, cast
 
 from facesynth.atomic import write_text
 from facesynth.corpus.files import check_id
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 
 Split = Literal["train", "test", ""]
 SPLITS: tuple[Split, ...] = ("train", "test", "")
@@ -45,7 +45,7 @@ class Record:
     aligned_hash: str = ""
     """sha256 of the TextGrid that an aligner wrote; empty where a person gave the phones."""
     given: str = ""
-    """A short hash of each thing that was given of the recording (`facesynth.corpus.given`); empty where that is not known."""
+    """A short hash of each thing that was given of the recording (`corpus.add.given`); empty where that is not known."""
     remarks: str = ""
     """What was noticed when it was added: of its motion | of its speech."""
 

@@ -16,14 +16,14 @@ from facesynth.corpus.header import Header
 from facesynth.corpus.npz import read_npz
 from facesynth.corpus.record import Record
 from facesynth.corpus.utterance import Utterance
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.gaps import LONGEST_S, GapReport, fill_gaps
-from facesynth.motion.motion import Motion
 from facesynth.motion.pose import fill_head
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.emotions import read_emotions, write_emotions
 from facesynth.speech.segments import Segment
-from facesynth.speech.speech import EmotionTrack, Speech
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
 
 Part = Literal["sound", "phones", "emotions", "motion"]

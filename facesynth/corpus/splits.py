@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from facesynth.corpus.record import Record
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 def by_sentence(records: Iterable[Record]) -> dict[str, list[Record]]:

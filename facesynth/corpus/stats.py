@@ -13,8 +13,8 @@ import numpy as np
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.eyes import EyeStats, eye_stats
 from facesynth.corpus.utterance import Utterance
+from facesynth.inference.phones import PHONES, SILENCE
 from facesynth.progress import track
-from facesynth.speech.phones import PHONES, SILENCE
 
 _RARELY_WRITTEN = frozenset({SILENCE, "ax", "el", "em", "en"})
 """Most dictionaries write the reduced ones as ah, or ah and a consonant."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import Speech
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
 
 
 @dataclass(frozen=True, eq=False)

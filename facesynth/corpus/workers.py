@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.progress import track
 
 Item = TypeVar("Item")

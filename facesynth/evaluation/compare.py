@@ -12,7 +12,6 @@ from filelock import FileLock, Timeout
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Contestant, Family, check_labels
 from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
@@ -26,6 +25,7 @@ from facesynth.evaluation.table import Column, Comparison, Row
 from facesynth.evaluation.tallies import Task, refuse_strangers, tally
 from facesynth.evaluation.variety import VARIETY
 from facesynth.evaluation.versions import versions
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 
 FOLDS = "folds.json"

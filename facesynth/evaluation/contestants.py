@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from facesynth.config import load_config
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
 from facesynth.methods.registry import create, method_class
 

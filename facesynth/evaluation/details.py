@@ -13,8 +13,8 @@ from facesynth.evaluation.curve import Point, compromises, mean_points
 from facesynth.evaluation.pair import Array, UnavailableError, distances, paired_points
 from facesynth.evaluation.regions import lip_points
 from facesynth.evaluation.time_alignment import aligned_distances
-from facesynth.motion.motion import Motion
-from facesynth.speech.phones import SILENCE
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import SILENCE
 
 BINS = 61
 HISTOGRAM_SPREADS = 3.0

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.pair import Array, UnavailableError, distances, mean_present, paired_points
 from facesynth.evaluation.regions import upper_face_points
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 
 def velocity_error(synthesised: Motion, truth: Motion) -> float:

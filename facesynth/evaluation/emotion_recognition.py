@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.motion.pca import Pca
 
 if TYPE_CHECKING:

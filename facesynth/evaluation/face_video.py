@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from facesynth.corpus import Utterance
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.point_face import PAPER, PointFace
-from facesynth.face.video import frame_count, write_video
-from facesynth.motion.motion import Motion
+from facesynth.face.draw.video import frame_count, write_video
+from facesynth.inference.motion import Motion
 
 PANEL = (240, 280)
 TITLE_PX = 22

@@ -12,7 +12,7 @@ import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 FORMAT = 1
 """Version of the file."""

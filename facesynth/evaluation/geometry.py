@@ -6,7 +6,7 @@ import numpy as np
 
 from facesynth.evaluation.pair import Array, UnavailableError, distances, mean_present, paired_points
 from facesynth.evaluation.regions import lip_points
-from facesynth.motion.motion import Motion
+from facesynth.inference.motion import Motion
 
 
 def marker_error(synthesised: Motion, truth: Motion) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
-from facesynth.motion.motion import Motion
+from facesynth.inference.motion import Motion
 
 
 def head_cca(synthesised: Motion, truth: Motion) -> float:

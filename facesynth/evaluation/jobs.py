@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 
 from facesynth.atomic import write_text
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.contestants import Contestant
 from facesynth.evaluation.cost import MB, peak_speaking_mb, stopwatch
 from facesynth.evaluation.folds import Fold, minutes_of, some_minutes, some_of
@@ -29,6 +28,7 @@ from facesynth.evaluation.predictions import (
     write_beside,
 )
 from facesynth.evaluation.versions import versions
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.method import Method
 from facesynth.methods.registry import create, load
 

@@ -9,14 +9,14 @@ from typing import Self
 import numpy as np
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import Confusion, EmotionRecogniser
 from facesynth.evaluation.folds import some_of
 from facesynth.evaluation.lips import closure_threshold
 from facesynth.evaluation.metrics import METRICS, Case
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.table import Row
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 NAN = float("nan")
 MOST_LEARNED = 400

@@ -1,6 +1,6 @@
 """Whether the mouth opens and shuts as much, and when, as the recorded one did.
 
-The opening is `facesynth.motion.lips.lip_gap`: upper minus lower inner lip, vertical, in the unit of the layout (u).
+The opening is `facesynth.inference.lips.lip_gap`: upper minus lower inner lip, vertical, in the unit of the layout (u).
 Blendshape curves are posed on the built-in head first: their opening is in mm.
 """
 
@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
-from facesynth.speech.phones import BILABIALS, OPEN_VOWELS
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import BILABIALS, OPEN_VOWELS
+from facesynth.inference.speech import PhoneTrack
 
 if TYPE_CHECKING:
-    from facesynth.face.markers import LipGap
+    from facesynth.face.rig.markers import LipGap
 
 
 def lip_gap_corr(synthesised: Motion, truth: Motion) -> float:
@@ -93,7 +93,7 @@ def paired_gaps(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:
 
 def _opening_on_head(motion: Motion) -> Array:
     """[T] opening (mm) that ARKit curves give the built-in head; curves that the layout lacks are 0."""
-    from facesynth.face.head import ARKIT_NAMES
+    from facesynth.face.rig.head import ARKIT_NAMES
 
     known = [i for i, name in enumerate(motion.layout.names) if name in ARKIT_NAMES]
     if not {"jawOpen", "mouthClose"} & set(motion.layout.names):
@@ -105,8 +105,8 @@ def _opening_on_head(motion: Motion) -> Array:
 
 @cache
 def _head_gap() -> LipGap:
-    from facesynth.face.markers import LipGap
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.markers import LipGap
+    from facesynth.face.rig.rig import load_head
 
     try:
         return LipGap.of(load_head())

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from facesynth.errors import unknown
 from facesynth.evaluation import dynamics, geometry, head, lips, timing, variety
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import unknown
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 
 @dataclass(frozen=True)

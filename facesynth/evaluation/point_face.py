@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.evaluation.pair import Array
-from facesynth.motion.layout import Layout
+from facesynth.inference.layout import Layout
 
 SKIN = np.array([205.0, 190.0, 178.0])
 MOUTH = np.array([70.0, 25.0, 30.0])

@@ -28,12 +28,12 @@ from typing import Protocol, Self, runtime_checkable
 import numpy as np
 
 from facesynth.atomic import atomic_path, write_text
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.cost import Spent
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
 from facesynth.methods.method import Method
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import Speech
 
 SAMPLES = "samples"
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.motion.layout import Layout
+from facesynth.inference.layout import Layout
 
 
 def lip_points(layout: Layout) -> NDArray[np.int64]:

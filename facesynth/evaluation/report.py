@@ -14,7 +14,6 @@ import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Family
@@ -32,7 +31,8 @@ from facesynth.evaluation.table import ARROWS, Comparison, short_number
 from facesynth.evaluation.tallies import read_motion
 from facesynth.evaluation.trajectories import MOST_SHOWN, trajectory_figure
 from facesynth.evaluation.verdict import verdicts
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.progress import track
 
 PAGE = "index.html"

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 
 def second_take(corpus: Corpus, utterance_id: str) -> Utterance | None:

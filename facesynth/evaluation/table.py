@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import unknown
 from facesynth.evaluation.emotion_recognition import Confusion
+from facesynth.inference.errors import unknown
 
 DRAWS = 2000
 """Bootstrap samples of the sentences."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.details import Details, DetailSums
 from facesynth.evaluation.dynamics import join_jump
@@ -17,7 +16,8 @@ from facesynth.evaluation.predictions import Beside, load_prediction, read_besid
 from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Row
 from facesynth.evaluation.variety import VARIETY
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from facesynth.evaluation.lips import lip_opening
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
 from facesynth.evaluation.time_alignment import dtw_path
-from facesynth.motion.motion import Motion
+from facesynth.inference.motion import Motion
 
 LONGEST_LAG_S = 0.25
 """No larger shift between sound and lips is looked for, s."""

@@ -11,8 +11,8 @@ from facesynth.corpus import Utterance
 from facesynth.evaluation.figures import as_uri, new_figure
 from facesynth.evaluation.pair import Array, UnavailableError, distances, paired_points
 from facesynth.evaluation.regions import lip_points
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,10 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.geometry import marker_error
 from facesynth.evaluation.pair import require_alike
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 
 def diversity(samples: Sequence[Motion]) -> float:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
 from facesynth.export.expectation import expectation_graph, predictor_parts
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
 from facesynth.export.speech_graphs import log_mel_graph, rasta_plp_stream_graph
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.features import RATE
 from facesynth.methods.anime_graph.lowpass import low_pass
 from facesynth.methods.anime_graph.method import AnimeGraph

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.methods.baselines.hearing import Hearing
 from facesynth.methods.efase.audio import PLACES, SPAN, PhoneSound
 from facesynth.methods.efase.nodes import Ints
-from facesynth.methods.efase.prediction import PHONE_SIZE, RATE, PosePredictor
+from facesynth.methods.learn.expectation import PHONE_SIZE, RATE, PosePredictor
+from facesynth.methods.learn.hearing import Hearing
 
 
 def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.face.deform import MeshDistanceDeformer
-from facesynth.face.regions import RegionDeformer
-from facesynth.face.rig import Rig
-from facesynth.motion.layout import Layout
+from facesynth.face.rig.deform import MeshDistanceDeformer
+from facesynth.face.rig.regions import RegionDeformer
+from facesynth.face.rig.rig import Rig
+from facesynth.inference.layout import Layout
 
 
 def mesh_deformation_graph(rig: Rig, layout: Layout) -> Graph:

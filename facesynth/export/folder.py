@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth import __version__
-from facesynth.errors import FacesynthError
 from facesynth.export.builder import OPSET
 from facesynth.export.graph import Graph, Parity, check_parity
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 
 FORMAT = 2
@@ -95,7 +95,7 @@ def _require_free(folder: Path) -> None:
 
 
 def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[str, Parity]) -> dict[str, Any]:
-    from facesynth.speech.phones import PHONES, viseme_of
+    from facesynth.inference.phones import PHONES, viseme_of
 
     files = sorted(path for path in part.iterdir())
     manifest: dict[str, Any] = {

@@ -11,7 +11,7 @@ import numpy as np
 import onnx
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 TOLERANCE = 1e-4
 """Largest difference, relative to the largest value, that export lets pass."""

@@ -6,9 +6,9 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from facesynth.errors import FacesynthError
 from facesynth.export.folder import Subject, write_folder
 from facesynth.export.weights import Weights, stored_as
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.methods.method import Method
 from facesynth.methods.registry import load

@@ -10,8 +10,8 @@ import onnx
 from numpy.typing import NDArray
 from onnx import helper, numpy_helper
 
-from facesynth.errors import unknown
 from facesynth.export.folder import Content
+from facesynth.inference.errors import unknown
 
 Weights = Literal["float32", "float16", "int8"]
 LARGE = 1024

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.errors import FacesynthError
-from facesynth.face.closures import with_lips_apart, with_lips_met
-from facesynth.face.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
-from facesynth.face.markers import LipGap, marker_vertices
-from facesynth.face.rig import ARKIT_NAMES, LOOK_DOWN_RAD, LOOK_OUT_RAD, LOOK_UP_RAD, PIVOT_MM, Rig, gaze_weights
-from facesynth.face.tongue import TIP_OUT, TIP_UP, tongue_track
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.closures import with_lips_apart, with_lips_met
+from facesynth.face.rig.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
+from facesynth.face.rig.markers import LipGap, marker_vertices
+from facesynth.face.rig.rig import ARKIT_NAMES, LOOK_DOWN_RAD, LOOK_OUT_RAD, LOOK_UP_RAD, PIVOT_MM, Rig, gaze_weights
+from facesynth.face.rig.tongue import TIP_OUT, TIP_UP, tongue_track
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.pose import rigid_points
-from facesynth.speech.speech import PhoneTrack
 
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 ALREADY_BLINKS = 0.5
@@ -172,8 +172,8 @@ def _check_whole(motion: Motion) -> None:
 def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if motion.layout.kind == "curves":
         return _curves(motion), None
-    from facesynth.face.blendshapes import MarkerBasis, solve_markers
-    from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of
+    from facesynth.face.rig.blendshapes import MarkerBasis, solve_markers
+    from facesynth.face.rig.fitting import fit_layout, is_of_the_head, rest_of
 
     known = np.zeros((len(motion), len(rig.names)))
     if motion.eyes is not None:
@@ -215,7 +215,7 @@ def _head_on(rig: Rig, motion: Motion, gain: float) -> NDArray[np.float64]:
 
 
 def _pose_centre(rig: Rig, motion: Motion) -> NDArray[np.float64]:
-    from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of
+    from facesynth.face.rig.fitting import fit_layout, is_of_the_head, rest_of
 
     layout = motion.layout
     if layout.kind != "markers":

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.channel_map import ChannelMap
-from facesynth.face.rig import ARKIT_NAMES
+from facesynth.face.rig.channel_map import ChannelMap
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,10 @@ from torch import nn
 from facesynth import __version__
 from facesynth.atomic import atomic_path
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError, unknown
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import Speech
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
 
 FORMAT = 1
 """Version of the model file; a file of another version is refused."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 LONGEST_S = 0.1
 """Longest gap that is filled, seconds: about the shortest movement that one could miss."""

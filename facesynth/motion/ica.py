@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 MOST_FRAMES = 60_000
 """Neighbouring frames repeat each other: of more frames than this, evenly spaced ones are learned from."""

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 class Pca(nn.Module):

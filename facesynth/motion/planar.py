@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.motion.layout import Layout
+from facesynth.inference.layout import Layout
 
 _NAME = re.compile(r"p\d{3,}")
 

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.motion.gaps import LONGEST_S, missing_in, runs
-from facesynth.motion.layout import Layout
 
 FEWEST_POINTS = 3
 _THIN = 1e-4

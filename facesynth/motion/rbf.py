@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 
 Kernel = Literal["exponential", "gaussian"]
 KERNELS: tuple[Kernel, ...] = ("exponential", "gaussian")

@@ -10,9 +10,9 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import missing_in
-from facesynth.motion.motion import Motion
 
 PASS = 0.9
 """Movement up to this share of the new rate's Nyquist frequency is kept when the rate falls."""

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.phones import VOWELS
+from facesynth.inference.speech import PhoneTrack
 from facesynth.performer.targets import CURVES, DIPHTHONGS, GLIDE_AT, Closes, Target, load_targets
-from facesynth.speech.phones import VOWELS
-from facesynth.speech.speech import PhoneTrack
 
 REACH_S = 0.6
 """Beyond this a gesture is not felt."""

@@ -9,14 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.markers import marker_layout, marker_vertices
-from facesynth.face.rig import Rig, pose_points
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.markers import marker_layout, marker_vertices
+from facesynth.face.rig.rig import Rig, pose_points
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import SILENCE
+from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.pose import remove_head, rigid_points
 from facesynth.performer.performance import Performance
-from facesynth.speech.phones import SILENCE
-from facesynth.speech.speech import PhoneTrack
 
 NOISE_MM = 0.1
 """RMS distance between a marker and where the cameras see it."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
+from facesynth.inference.phones import SILENCE, VOWELS
+from facesynth.inference.speech import Speech
 from facesynth.performer.prosody import FRAME_S
-from facesynth.speech.phones import SILENCE, VOWELS
-from facesynth.speech.speech import Speech
 
 PITCH_SCALE = 0.25
 """A pitch this much (natural logarithm) above the speaker's median counts as 1."""

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.errors import unknown
-from facesynth.face.head import ARKIT_NAMES
+from facesynth.face.rig.head import ARKIT_NAMES
+from facesynth.inference.errors import unknown
+from facesynth.inference.speech import EmotionTrack
 from facesynth.performer.articulation import Articulation
 from facesynth.performer.cues import Cues
 from facesynth.performer.targets import CURVES
 from facesynth.performer.wander import wander
-from facesynth.speech.speech import EmotionTrack
 
 POSES: Mapping[str, Mapping[str, float]] = {
     "neutral": {},

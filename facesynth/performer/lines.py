@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import EmotionTrack
 from facesynth.performer.prosody import colour
 from facesynth.performer.stage import PAUSE_S, calm_speech
 from facesynth.performer.voice import speak
-from facesynth.speech.speech import EmotionTrack
 
 BETWEEN_S = 0.12
 """Silence at each side of a joint between two lines: a breath, not a stop."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
-from facesynth.face.markers import LipGap
-from facesynth.face.rig import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.markers import LipGap
+from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import Speech
 from facesynth.performer.articulation import Articulation, articulate
 from facesynth.performer.cues import Cues, listen
 from facesynth.performer.emotion import feel, show, sides
@@ -17,7 +18,6 @@ from facesynth.performer.eyes import Eyes, look
 from facesynth.performer.head_motion import move_head
 from facesynth.performer.targets import CURVES, SHAPES
 from facesynth.performer.wander import wander
-from facesynth.speech.speech import Speech
 
 TUCK_GAP_MM = 2.4
 """Inner-lip gap where the lower lip is at the upper teeth."""

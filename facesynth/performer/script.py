@@ -10,8 +10,8 @@ from importlib.resources import files
 from itertools import pairwise
 from typing import Literal
 
-from facesynth.errors import FacesynthError, unknown
-from facesynth.speech.phones import BILABIALS, LABIODENTALS, SILENCE, normalise_phone
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.phones import BILABIALS, LABIODENTALS, SILENCE, normalise_phone
 
 Size = Literal["small", "full"]
 SIZES: tuple[Size, ...] = ("small", "full")

@@ -8,17 +8,17 @@ from functools import cache
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
-from facesynth.face.markers import LipGap
-from facesynth.face.rig import Rig, load_head
+from facesynth.face.rig.markers import LipGap
+from facesynth.face.rig.rig import Rig, load_head
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.performer.capture import Capture, capture
 from facesynth.performer.performance import perform
 from facesynth.performer.prosody import Analysis, Voiced, analyse, colour
 from facesynth.performer.takes import Take
 from facesynth.performer.voice import speak
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.segments import Segment
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 FPS = 120.0
 PAUSE_S = 0.35

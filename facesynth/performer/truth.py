@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.atomic import write_text
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.performer.capture import Fault
 
 FILE = "performer_truth.json"

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio
 

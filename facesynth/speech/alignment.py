@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import PhoneTrack
 from facesynth.progress import track
 from facesynth.speech.audio import require_sound
 from facesynth.speech.fitting import Fitted, fit_phones, fit_words
 from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
 from facesynth.speech.segments import Segment, in_one, phone_track
-from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.transcript import words_of
 
 WORST_FIT = -85.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from av.container import InputContainer

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 SMALLEST_MAGNITUDE = 1e-10
 """Spectral magnitudes are not taken to be smaller: the logarithm of digital silence is finite."""

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.atomic import write_text
-from facesynth.errors import FacesynthError, unknown
-from facesynth.speech.speech import EmotionTrack
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.speech import EmotionTrack
 
 NEUTRAL = "neutral"
 _COLUMNS = ("start_s", "end_s", "emotion", "intensity")

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.phones import SILENCE
 from facesynth.speech.decoding import FRAME_S, decode, decoder_sound, heard_time, new_decoder
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.pronunciation import pronunciations
 from facesynth.speech.segments import Segment
 

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.audio import load_audio, require_sound
 from facesynth.speech.emotions import NEUTRAL, read_emotions
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.segments import Segment, covering
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.textgrid import read_label_lines, read_textgrid
 
 Source = Literal["textgrid", "labels", "transcript", "recognition"]

@@ -8,9 +8,9 @@ from typing import Literal, get_args
 import torch
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.speech import Speech
 from facesynth.speech.audio import resample
-from facesynth.speech.speech import Speech
 
 Scale = Literal["linear", "log"]
 RATE = 16_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.letter_to_sound import sound_out
 
 Pronunciation = tuple[str, ...]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 POLE_PER_10_MS = 0.94
 """Pole of the RASTA filter at 100 frames per second (integration over about 160 ms)."""

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
-from facesynth.speech.phones import CLOSURES, SILENCE, normalise_phone
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import CLOSURES, SILENCE, normalise_phone
+from facesynth.inference.speech import PhoneTrack
 
 Segment = tuple[str, float, float]
 """Label, start and end in seconds."""

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.atomic import atomic_path, write_text
-from facesynth.errors import FacesynthError
-from facesynth.speech.phones import SILENCE
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.segments import Segment, phone_track, segments_of
-from facesynth.speech.speech import PhoneTrack
 
 Words = tuple[Segment, ...]
 """Word, start and end in seconds; silence between words is left out."""

@@ -7,8 +7,8 @@ from facesynth.capture.landmarks import GROUPS, LIP_PAIRS, NAMES, RIGID, landmar
 from facesynth.capture.motion import motion_of
 from facesynth.capture.shape import neutral_shape
 from facesynth.capture.track import Track
-from facesynth.errors import FacesynthError
-from facesynth.motion.lips import lip_gap
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
 
 
 def nodding(count=60):

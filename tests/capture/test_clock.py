@@ -3,8 +3,8 @@ import pytest
 from corpora import tiny_layout
 
 from facesynth.capture.clock import Clock, Recorder, clock_between, on_clock
-from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 RATE = 16000
 

@@ -12,7 +12,7 @@ from facesynth.capture.square import Square
 from facesynth.capture.track import track_face
 from facesynth.capture.tracker import Seen, Tracker
 from facesynth.capture.video import open_video
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 class Faces:

@@ -7,7 +7,7 @@ import pytest
 
 from facesynth.capture import models
 from facesynth.capture.tflite_to_onnx import to_onnx
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture

@@ -13,12 +13,12 @@ from facesynth.cli.speak import speak
 from facesynth.cli.train import train
 from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos, shapes_beside
-from facesynth.errors import FacesynthError
+from facesynth.face.draw.video import read_video, write_video
 from facesynth.face.texture.speaker import Speaker
-from facesynth.face.video import read_video, write_video
-from facesynth.likeness import face_path, speaker_of
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import save_wav
+from facesynth.stage.likeness import face_path, speaker_of
 
 pytest.importorskip("cv2")
 FPS, FRAMES, RATE = 25, 50, 16_000

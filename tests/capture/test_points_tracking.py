@@ -9,8 +9,8 @@ from facesynth.capture.points.reference import Reference
 from facesynth.capture.points.region import FaceRegion
 from facesynth.capture.points.shapes import outliers
 from facesynth.capture.points.tracking import corners, drift, follow_clip, neighbours_mean
-from facesynth.errors import FacesynthError
-from facesynth.face.video import write_video
+from facesynth.face.draw.video import write_video
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import picture_points
 
 cv2 = pytest.importorskip("cv2")

@@ -5,7 +5,7 @@ import pytest
 from clips import write_video
 
 from facesynth.capture.video import open_video
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 def read(path):

@@ -8,7 +8,7 @@ from corpora import tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
 

@@ -10,14 +10,14 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
-from facesynth.face.head import head_folder
-from facesynth.face.markers import marker_layout
-from facesynth.face.rig import load_head
+from facesynth.face.rig.head import head_folder
+from facesynth.face.rig.markers import marker_layout
+from facesynth.face.rig.rig import load_head
+from facesynth.inference.motion import Motion
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.emotion.clips import clips_of_corpus
 from facesynth.methods.emotion.detector import Clip, EmotionDetector
-from facesynth.motion.motion import Motion
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.textgrid import write_textgrid

@@ -6,8 +6,8 @@ from corpora import tiny_corpus
 
 from facesynth.cli.evaluate import evaluate
 from facesynth.cli.reproduce import reproduce
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import jobs
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture(scope="module")

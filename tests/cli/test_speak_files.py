@@ -12,7 +12,7 @@ from corpora import tiny_corpus
 
 from facesynth.cli import main
 from facesynth.cli.targets import plan_targets
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
@@ -168,7 +168,7 @@ def test_a_signal_in_the_middle_leaves_nothing(model, tmp_path, sent):
     slow = (
         "import signal, time\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # tests that run in the background inherit deaf ears
-        "import facesynth.speaking as s\n"
+        "import facesynth.stage.performance as s\n"
         "from facesynth.atomic import atomic_path\n"
         "def hang(path, *rest):\n"
         "    with atomic_path(path) as part:\n"

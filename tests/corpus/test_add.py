@@ -6,11 +6,11 @@ import pytest
 from corpora import EMOTIONS, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add, find_recordings
+from facesynth.corpus.add.add import add, find_recordings
+from facesynth.corpus.add.transcripts import read_transcripts
 from facesynth.corpus.align import align
-from facesynth.corpus.check import check
-from facesynth.corpus.transcripts import read_transcripts
-from facesynth.errors import FacesynthError
+from facesynth.corpus.checks.check import check
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pose import apply_head, rigid_points
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_label_lines, write_textgrid
@@ -285,7 +285,7 @@ def test_an_account_outlives_other_imports_and_damage(session, tmp_path):
 
 
 def test_a_fault_of_the_program_ends_one_recording_alone(session, tmp_path, monkeypatch):
-    from facesynth.corpus import prepare
+    from facesynth.corpus.add import prepare
 
     real = prepare.read_motion
 

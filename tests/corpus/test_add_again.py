@@ -10,10 +10,10 @@ import pytest
 from corpora import EMOTIONS, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
+from facesynth.corpus.add.add import add
 from facesynth.corpus.record import COLUMNS
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.audio import save_wav
-from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.textgrid import write_textgrid
 
 A, B, C = "s00_happy_t1", "s00_neutral_t1", "s00_neutral_t2"
@@ -43,7 +43,7 @@ def aligner(monkeypatch):
 @pytest.fixture
 def readings(monkeypatch):
     """Motion files that were read."""
-    from facesynth.corpus import prepare
+    from facesynth.corpus.add import prepare
 
     read, real = [], prepare.read_motion
     monkeypatch.setattr(

@@ -6,8 +6,8 @@ from corpora import tiny_corpus
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.align import align
-from facesynth.errors import FacesynthError
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import PhoneTrack
 
 
 @dataclass(frozen=True)

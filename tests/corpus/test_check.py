@@ -6,10 +6,10 @@ import pytest
 from corpora import tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.check import check as check_all
+from facesynth.corpus.checks.check import check as check_all
 from facesynth.corpus.record import write_records
-from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.speech.audio import save_wav
 
 ID = "s00_happy_t1"

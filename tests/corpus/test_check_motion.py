@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from corpora import tiny_layout, tiny_utterances
 
-from facesynth.corpus.check_motion import motion_problems
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.corpus.checks.motion import motion_problems
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 FPS = 60.0
 ROWS, COLUMNS = 9, 12

@@ -9,10 +9,10 @@ from corpora import EMOTIONS, tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus, Record
 from facesynth.corpus.signals import fit_length
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, Speech
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, Speech
 
 ABOUT = {"performer": "Åsa B.", "layout": tiny_layout(), "fps": 60, "emotions": EMOTIONS}
 

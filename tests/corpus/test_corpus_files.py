@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from facesynth.corpus.files import Files, check_id
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.mark.parametrize(

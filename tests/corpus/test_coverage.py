@@ -7,7 +7,7 @@ from corpora import tiny_corpus
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus.coverage import diphones, read_sentences, sentences_to_add
 from facesynth.corpus.pictures import draw
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 SENTENCES = ("Sing a song.", "Judge the young giant.", "A song.", "Judge the young giant.")
 

@@ -9,13 +9,13 @@ import pytest
 from corpora import EMOTIONS, tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
-from facesynth.corpus.check import check
+from facesynth.corpus.add.add import add
+from facesynth.corpus.add.prepare import FAULT
+from facesynth.corpus.add.transcripts import read_transcripts
+from facesynth.corpus.checks.check import check
 from facesynth.corpus.motion_files import channel_names, load_motion
-from facesynth.corpus.prepare import FAULT
 from facesynth.corpus.record import read_listed
-from facesynth.corpus.transcripts import read_transcripts
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_label_lines, write_textgrid
 

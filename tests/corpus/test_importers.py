@@ -11,12 +11,12 @@ from clips import write_video
 
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
+from facesynth.corpus.add.add import add
 from facesynth.corpus.importers.convert import convert
 from facesynth.corpus.importers.description import Description, Written, turned
 from facesynth.corpus.importers.formats import read
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.speech.audio import save_wav
 
 LAYOUT = Layout("markers", ("chin", "lip"), {"jaw": (0,), "mouth": (1,)})

@@ -13,12 +13,12 @@ from test_importers import articulography, hum, hurt, livelink_text, write_c3d
 
 from facesynth.cli import cli
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
+from facesynth.corpus.add.add import add
 from facesynth.corpus.importers.formats import read
 from facesynth.corpus.importers.session import corpus_from_files, survey
 from facesynth.corpus.workers import Workers
-from facesynth.errors import FacesynthError
-from facesynth.motion.lips import lip_gap
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
 from facesynth.motion.pose import apply_head
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_textgrid

@@ -13,14 +13,14 @@ from facesynth.capture.models import MODELS, _kept
 from facesynth.capture.shape import neutral_shape
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
+from facesynth.corpus.add.add import add
+from facesynth.corpus.add.recordings import find_recordings
+from facesynth.corpus.add.transcripts import read_transcripts
 from facesynth.corpus.importers.recorder import cut_for
 from facesynth.corpus.importers.video import corpus_from_video, motion_from_video
-from facesynth.corpus.recordings import find_recordings
-from facesynth.corpus.transcripts import read_transcripts
 from facesynth.corpus.workers import Workers
-from facesynth.errors import FacesynthError
-from facesynth.motion.lips import lip_gap
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
 from facesynth.speech.audio import load_audio, save_wav
 
 LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven please", "swbm3n": "set white by m three now"}

@@ -5,7 +5,7 @@ import pytest
 from corpora import tiny_corpus
 
 from facesynth.corpus import Corpus, node_name, parse_node
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from corpora import tiny_layout, tiny_utterances
 
 from facesynth.corpus.motion_files import channel_names, load_motion
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.motion.pose import apply_head, rigid_points
 
 LAYOUT = tiny_layout()

@@ -15,7 +15,7 @@ from interrupted import lasting
 
 from facesynth.capture.models import MODELS, _kept
 from facesynth.corpus import Corpus
-from facesynth.corpus.add import add
+from facesynth.corpus.add.add import add
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_textgrid
 
@@ -68,7 +68,7 @@ def test_two_ray_workers_give_the_same_bytes_as_one_process_and_a_dead_one_is_re
         """
         import json, os, sys
         from pathlib import Path
-        import facesynth.corpus.add as adding
+        import facesynth.corpus.add.add as adding
         from facesynth.corpus import Corpus
         from facesynth.corpus.workers import Workers
 

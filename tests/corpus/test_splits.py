@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from facesynth.corpus.record import Record
 from facesynth.corpus.splits import fold_ids, split_ids
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 RECORDS = [
     Record(f"s{s}_{e}_{t}", sentence=f"s{s}", emotion=e, take=t) for s in range(10) for e in ("neutral", "sad") for t in (1, 2)

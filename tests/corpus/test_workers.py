@@ -8,7 +8,7 @@ import pytest
 from interrupted import descendants, left_after
 
 from facesynth.corpus.workers import Workers, spread
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 def negative(number):

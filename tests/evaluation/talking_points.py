@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 NAMES = ("brow_l", "brow_r", "lid_l", "lid_r", "nose", "lip_up", "lip_up_l", "lip_low", "lip_low_l", "corner", "jaw", "cheek")
 REST = np.array(

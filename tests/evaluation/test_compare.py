@@ -8,17 +8,17 @@ from corpora import tiny_corpus
 from filelock import FileLock
 
 from facesynth.corpus.workers import Workers
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import jobs
 from facesynth.evaluation.compare import evaluate, folds_beside, judge_predictions, predicted_labels
 from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family
 from facesynth.evaluation.folds import Fold, make_folds
 from facesynth.evaluation.geometry import marker_error
 from facesynth.evaluation.predictions import load_prediction, save_prediction
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
 COSTS = ("train_s", "train_cpu_s", "train_minutes", "rtf", "rtf_cpu", "peak_mb", "model_mb")

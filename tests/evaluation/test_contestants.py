@@ -1,7 +1,7 @@
 import pytest
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.contestants import Contestant, check_labels, contestant, read_family, references
+from facesynth.inference.errors import FacesynthError
 
 
 def test_a_method_by_name_or_by_settings_file(repository):

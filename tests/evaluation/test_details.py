@@ -8,7 +8,7 @@ from facesynth.evaluation.curve import GAINS
 from facesynth.evaluation.details import DetailSums, overall_aligned, residual_reach
 from facesynth.evaluation.geometry import lve, lve_centred
 from facesynth.evaluation.time_alignment import aligned_distances
-from facesynth.speech.speech import EmotionTrack, Speech
+from facesynth.inference.speech import EmotionTrack, Speech
 
 TRACK = phones(("pau", 0.5), ("m", 1.0), ("aa", 2.0), ("m", 3.0), ("pau", 4.0))
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from talking_points import FPS, LAYOUT, REST, face, moved, talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import dynamics
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 
 def scaled(motion, size):

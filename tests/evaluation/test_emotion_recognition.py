@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import Confusion, EmotionRecogniser
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@ import json
 import pytest
 from corpora import tiny_corpus
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.folds import make_folds, minutes_of, read_folds, some_minutes, write_folds
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture(scope="module")

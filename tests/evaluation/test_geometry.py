@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from talking_points import FPS, LAYOUT, moved, talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import geometry
 from facesynth.evaluation.metrics import METRICS, Case, metric
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 OFFSETS = [geometry.marker_error, geometry.lve]
 SQUARES = [geometry.deng_error, geometry.lve_sq]

@@ -3,12 +3,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from talking_points import moved, talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import variety
 from facesynth.evaluation.head import head_cca, head_distance
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 
 def nodding(rotations):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from talking_points import FPS, LAYOUT, moved, phones, talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.compare import COSTS
 from facesynth.evaluation.lips import closure_threshold
 from facesynth.evaluation.metrics import DEFINITIONS, METRICS, Case, metric
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 TRACK = phones(("pau", 0.2), *[(label, 0.4 + 0.2 * i) for i, label in enumerate(["m", "aa", "b", "ay", "p", "ah"] * 3)])
 NOISE = 0.5

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from talking_points import FPS, LAYOUT, face, phones, talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation import lips, timing
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.time_alignment import dtw_path
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 
 def test_identity_and_opposite():

@@ -4,10 +4,10 @@ import io
 import pytest
 from corpora import tiny_corpus
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.papers import reproduce
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
 from facesynth.evaluation.papers.joined import joined, phones_until
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture(scope="module")

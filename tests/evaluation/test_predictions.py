@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from talking_points import talk
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.predictions import (
     Beside,
     load_prediction,
@@ -12,7 +11,8 @@ from facesynth.evaluation.predictions import (
     save_prediction,
     write_beside,
 )
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 
 def test_what_is_kept_is_what_was_made_and_the_same_bytes_every_time(tmp_path):

@@ -19,11 +19,11 @@ from facesynth.evaluation.point_face import PointFace
 from facesynth.evaluation.report import PAGE, Wish, pictured_rows, typical, write_report
 from facesynth.evaluation.table import short_number
 from facesynth.evaluation.verdict import verdicts
-from facesynth.face.video import read_video
+from facesynth.face.draw.video import read_video
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.registry import register
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
 
 FILES = (
     "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv residuals.csv "

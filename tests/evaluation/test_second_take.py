@@ -5,8 +5,8 @@ from talking_points import FPS, face, phones
 
 from facesynth.corpus import Utterance
 from facesynth.evaluation.second_take import retimed, second_take
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, Speech
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, Speech
 
 
 def take(gap, track):

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import Confusion
 from facesynth.evaluation.exports import best_labels
 from facesynth.evaluation.table import Column, Comparison, Row, interval
+from facesynth.inference.errors import FacesynthError
 
 NAN = math.nan
 ALONE = [str(i) for i in range(40)]

@@ -1,20 +1,21 @@
-"""Small trained models and the folders that they are exported to; the runtime is taken from the checkout."""
+"""Small trained models and the folders that they are exported to."""
 
-import sys
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from corpora import RATE, tiny_corpus, tiny_utterances
 
-RUNTIME = Path(__file__).parents[2] / "export" / "runtime"
-sys.path.insert(0, str(RUNTIME))
-
 
 @pytest.fixture(scope="session")
-def runtime_folder() -> Path:
-    """The second distribution."""
-    return RUNTIME
+def runtime_folder(repository, tmp_path_factory) -> Path:
+    """A folder that holds facesynth_runtime as its wheel does, and nothing else."""
+    folder = tmp_path_factory.mktemp("runtime")
+    shutil.copytree(
+        repository / "facesynth" / "inference", folder / "facesynth_runtime", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    return folder
 
 
 @pytest.fixture(scope="session")

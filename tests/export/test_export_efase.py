@@ -1,12 +1,6 @@
 import numpy as np
 import pytest
 import torch
-from facesynth_runtime import RuntimeInputError, load
-from facesynth_runtime.efase.bounds import StepBounds
-from facesynth_runtime.efase.nodes import Nodes, Query, Weights
-from facesynth_runtime.efase.search import Search
-from facesynth_runtime.efase.stream import GUARD_S
-from facesynth_runtime.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
@@ -16,7 +10,13 @@ from scipy.signal import butter, sosfiltfilt
 from facesynth.export.graph import difference
 from facesynth.export.models import export_model
 from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
-from facesynth.methods.efase import prediction
+from facesynth.inference import FacesynthError, load
+from facesynth.inference.efase.bounds import StepBounds
+from facesynth.inference.efase.nodes import Nodes, Query, Weights
+from facesynth.inference.efase.search import Search
+from facesynth.inference.efase.stream import GUARD_S
+from facesynth.inference.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
+from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.efase.costs import Query as TorchQuery
 from facesynth.methods.efase.costs import Weights as TorchWeights
 from facesynth.methods.efase.costs import path_cost
@@ -24,7 +24,7 @@ from facesynth.methods.efase.method import NODE_FIELDS, Efase
 from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.plan import part
 from facesynth.methods.efase.search import build_index, search
-from facesynth.speech.speech import EmotionTrack, Speech
+from facesynth.methods.learn import expectation as prediction
 
 
 @pytest.fixture(scope="module")
@@ -228,25 +228,25 @@ def test_constraints_are_kept(pair, speeches):
     assert runtime.names[got.nodes[3]] == name
     assert names_of(runtime, got.nodes) == names_of(model, wanted.nodes)
     for constraints, message in (({3: "nobody:1"}, "unknown node"), ({0: name}, "is silence"), ({99: name}, "no phone 99")):
-        with pytest.raises(RuntimeInputError, match=message):
+        with pytest.raises(FacesynthError, match=message):
             runtime.plan(speeches[0], constraints=constraints)
 
 
 def test_what_is_wrong_is_named(pair, speeches):
     _, runtime = pair
-    with pytest.raises(RuntimeInputError, match="fps is -5"):
+    with pytest.raises(FacesynthError, match="fps is -5"):
         runtime.synthesize(speeches[0], fps=-5)
-    with pytest.raises(RuntimeInputError, match="look_ahead is 0"):
+    with pytest.raises(FacesynthError, match="look_ahead is 0"):
         runtime.synthesize(speeches[0], look_ahead=0)
     stream = runtime.stream()
-    with pytest.raises(RuntimeInputError, match="unknown phone 'xx'"):
+    with pytest.raises(FacesynthError, match="unknown phone 'xx'"):
         stream.push("xx", 0.1, "happy")
-    with pytest.raises(RuntimeInputError, match="unknown emotion 'bored'"):
+    with pytest.raises(FacesynthError, match="unknown emotion 'bored'"):
         stream.push("aa", 0.1, "bored")
     stream.push("aa", 0.1, "happy")
-    with pytest.raises(RuntimeInputError, match="wanted an end after 0.1 s"):
+    with pytest.raises(FacesynthError, match="wanted an end after 0.1 s"):
         stream.push("aa", 0.1, "happy")
-    with pytest.raises(RuntimeInputError, match="weakened=True"):
+    with pytest.raises(FacesynthError, match="weakened=True"):
         stream.push("aa", 0.2, "happy", 0.5)
 
 
@@ -291,7 +291,7 @@ def test_means_over_paths_and_what_is_heard_are_those_of_torch(soft_pair, speech
 def test_a_model_that_looks_at_the_whole_does_not_stream(soft_pair, speeches):
     _, runtime = soft_pair
     for ask in (runtime.stream, lambda: runtime.synthesize(speeches[0], look_ahead=3)):
-        with pytest.raises(RuntimeInputError, match="temperature=0"):
+        with pytest.raises(FacesynthError, match="temperature=0"):
             ask()
 
 

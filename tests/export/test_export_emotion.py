@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from facesynth_runtime import RuntimeInputError, load
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facesynth.export.models import export_model
+from facesynth.inference import FacesynthError, load
 from facesynth.methods.emotion.clips import clips_of_corpus
 from facesynth.methods.emotion.detector import DetectorSettings, EmotionDetector
 
@@ -63,15 +63,15 @@ def test_pieces_of_any_size_give_the_track_of_the_whole(pair, long_sound, sizes)
 
 def test_what_is_wrong_is_named(pair):
     _, runtime = pair
-    with pytest.raises(RuntimeInputError, match="48000 Hz; wanted 16000 Hz"):
+    with pytest.raises(FacesynthError, match="48000 Hz; wanted 16000 Hz"):
         runtime.stream(sample_rate=48000)
-    with pytest.raises(RuntimeInputError, match="constant"):
+    with pytest.raises(FacesynthError, match="constant"):
         runtime.detect(np.zeros(16000, np.float32), 16000)
-    with pytest.raises(RuntimeInputError, match="50 ms long"):
+    with pytest.raises(FacesynthError, match="50 ms long"):
         runtime.detect(np.zeros(800, np.float32), 16000)
-    with pytest.raises(RuntimeInputError, match=r"wanted float64 \['batch', 187\]"):
+    with pytest.raises(FacesynthError, match=r"wanted float64 \['batch', 187\]"):
         runtime(np.zeros((1, 5)))
-    with pytest.raises(RuntimeInputError, match="no sound was pushed"):
+    with pytest.raises(FacesynthError, match="no sound was pushed"):
         runtime.stream().finish()
 
 

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
-from facesynth_runtime import Resampler, RuntimeInputError, load, resample
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facesynth.export.graph import difference
+from facesynth.inference import FacesynthError, Resampler, load, resample
+from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.audio import resample as facesynth_resample
-from facesynth.speech.speech import Speech
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_resampled_pieces_are_the_resampled_whole(rate, new_rate, length, sizes)
     got, wanted = np.concatenate([*pieces, resampler.finish()]), resample(sound, rate, new_rate)
     assert got.shape == wanted.shape
     assert np.array_equal(got, wanted)
-    with pytest.raises(RuntimeInputError, match="was finished"):
+    with pytest.raises(FacesynthError, match="was finished"):
         resampler.push(sound)
 
 
@@ -113,25 +113,25 @@ def test_a_state_is_kept_and_taken_up_again(pair, speeches):
 
 def test_what_is_wrong_is_named(pair, speeches):
     _, runtime = pair
-    with pytest.raises(RuntimeInputError, match="44100 Hz; wanted 16000 Hz"):
+    with pytest.raises(FacesynthError, match="44100 Hz; wanted 16000 Hz"):
         runtime.stream(sample_rate=44100)
-    with pytest.raises(RuntimeInputError, match="noise is -1"):
+    with pytest.raises(FacesynthError, match="noise is -1"):
         runtime.synthesize(speeches[0], noise=-1)
-    with pytest.raises(RuntimeInputError, match="look_ahead"):
+    with pytest.raises(FacesynthError, match="look_ahead"):
         runtime.synthesize(speeches[0], look_ahead=3)
-    with pytest.raises(RuntimeInputError, match=r"float32 \[1, 5, 3\]; wanted float32 \['batch', 'frames', 4\]"):
+    with pytest.raises(FacesynthError, match=r"float32 \[1, 5, 3\]; wanted float32 \['batch', 'frames', 4\]"):
         runtime.rollout(
             features=np.zeros((1, 5, 3), np.float32),
             innovations=np.zeros((1, 5, 4), np.float32),
             state=np.zeros((1, 4), np.float32),
         )
-    with pytest.raises(RuntimeInputError, match="innovations is float32"):
+    with pytest.raises(FacesynthError, match="innovations is float32"):
         runtime.rollout(
             features=np.zeros((1, 5, 4), np.float32),
             innovations=np.zeros((1, 6, 4), np.float32),
             state=np.zeros((1, 4), np.float32),
         )
-    with pytest.raises(RuntimeInputError, match="state is nothing"):
+    with pytest.raises(FacesynthError, match="state is nothing"):
         runtime.rollout(features=np.zeros((1, 5, 4), np.float32), innovations=np.zeros((1, 5, 4), np.float32))
 
 

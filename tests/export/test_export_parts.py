@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from facesynth_runtime import RuntimeInputError, load
 
 from facesynth.cli.export import export
 from facesynth.export.graph import BATCHES, LENGTHS, TOLERANCE, check_parity
 from facesynth.export.parts import export_features
 from facesynth.export.path_search import path_search_graph
 from facesynth.export.speech_graphs import rasta_plp_stream_graph
+from facesynth.inference import FacesynthError, load
 from facesynth.motion.paths import cheapest_path
 from facesynth.speech.rasta_plp import RastaPlp
 
@@ -72,11 +72,11 @@ def test_the_script_for_features(tmp_path, monkeypatch):
 
 
 def test_a_shape_is_named(features):
-    with pytest.raises(RuntimeInputError, match=r"audio is float32 \[100\]; wanted float32 \['batch', 'samples'\]"):
+    with pytest.raises(FacesynthError, match=r"audio is float32 \[100\]; wanted float32 \['batch', 'samples'\]"):
         features["rasta_plp"](audio=np.zeros(100, np.float32))
-    with pytest.raises(RuntimeInputError, match="audio is float64"):
+    with pytest.raises(FacesynthError, match="audio is float64"):
         features["rasta_plp"](audio=np.zeros((1, 100)))
-    with pytest.raises(RuntimeInputError, match="no graph 'melspec'"):
+    with pytest.raises(FacesynthError, match="no graph 'melspec'"):
         features["melspec"]
 
 

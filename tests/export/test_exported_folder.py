@@ -3,14 +3,13 @@ import shutil
 
 import numpy as np
 import pytest
-from facesynth_runtime import RuntimeInputError, load
-from facesynth_runtime.folder import open_folder
 
-from facesynth.errors import FacesynthError
 from facesynth.export.folder import digest
 from facesynth.export.graph import TOLERANCE, check_parity
 from facesynth.export.lds import lds_content
 from facesynth.export.models import export_model
+from facesynth.inference import FacesynthError, load
+from facesynth.inference.folder import open_folder
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.registry import create
 
@@ -54,25 +53,25 @@ def test_a_tampered_file_is_named(folder, name):
     content = bytearray((folder / name).read_bytes())
     content[len(content) // 2] ^= 1
     (folder / name).write_bytes(content)
-    with pytest.raises(RuntimeInputError, match=f"{name} does not have the hash"):
+    with pytest.raises(FacesynthError, match=f"{name} does not have the hash"):
         load(folder)
 
 
 def test_a_truncated_file_is_named(folder):
     (folder / "rollout.onnx").write_bytes((folder / "rollout.onnx").read_bytes()[:-7])
-    with pytest.raises(RuntimeInputError, match="rollout.onnx has .* bytes; wanted"):
+    with pytest.raises(FacesynthError, match="rollout.onnx has .* bytes; wanted"):
         load(folder)
 
 
 def test_a_missing_file_is_named(folder):
     (folder / "innovations.onnx").unlink()
-    with pytest.raises(RuntimeInputError, match="innovations.onnx: No such file"):
+    with pytest.raises(FacesynthError, match="innovations.onnx: No such file"):
         load(folder)
 
 
 def test_a_file_of_another_export_is_named(folder, emotion_file, exported):
     shutil.copy(exported(emotion_file) / "machine.onnx", folder / "rollout.onnx")
-    with pytest.raises(RuntimeInputError, match="rollout.onnx has"):
+    with pytest.raises(FacesynthError, match="rollout.onnx has"):
         load(folder)
 
 
@@ -80,17 +79,17 @@ def test_a_graph_that_is_not_the_manifests_is_named(folder):
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["graphs"]["rollout"]["file"] = "features.onnx"
     changed(folder, graphs=manifest["graphs"])
-    with pytest.raises(RuntimeInputError, match="features.onnx takes"):
+    with pytest.raises(FacesynthError, match="features.onnx takes"):
         load(folder)
 
 
 def test_a_changed_manifest_is_named(folder):
     text = (folder / "manifest.json").read_text()
     (folder / "manifest.json").write_text(text.replace("CC0-1.0", "MIT"))
-    with pytest.raises(RuntimeInputError, match="manifest.json was changed"):
+    with pytest.raises(FacesynthError, match="manifest.json was changed"):
         load(folder)
     (folder / "manifest.json").write_text(text[: len(text) // 2])
-    with pytest.raises(RuntimeInputError, match="manifest.json is damaged"):
+    with pytest.raises(FacesynthError, match="manifest.json is damaged"):
         load(folder)
 
 
@@ -105,7 +104,7 @@ def test_a_changed_manifest_is_named(folder):
 )
 def test_a_foreign_folder_is_refused(folder, changes, message):
     changed(folder, **changes)
-    with pytest.raises(RuntimeInputError, match=message):
+    with pytest.raises(FacesynthError, match=message):
         load(folder)
 
 
@@ -170,22 +169,22 @@ def test_a_foreign_manifest_with_a_hash_of_its_own_is_refused(
     manifest = json.loads((folder / "manifest.json").read_text())
     change(manifest)
     (folder / "manifest.json").write_text(json.dumps(manifest | {"sha256": digest(manifest)}))
-    with pytest.raises(RuntimeInputError, match=message):
+    with pytest.raises(FacesynthError, match=message):
         load(folder)
 
 
 @pytest.mark.parametrize("content", ["[" * 100_000, '{"a":' * 100_000, "\x00", ""])
 def test_a_manifest_of_nonsense_is_refused(folder, content):
     (folder / "manifest.json").write_text(content)
-    with pytest.raises(RuntimeInputError, match="manifest.json"):
+    with pytest.raises(FacesynthError, match="manifest.json"):
         load(folder)
 
 
 def test_what_is_no_folder_is_refused(tmp_path):
-    with pytest.raises(RuntimeInputError, match=r"manifest.json: no such file"):
+    with pytest.raises(FacesynthError, match=r"manifest.json: no such file"):
         load(tmp_path)
     (tmp_path / "manifest.json").write_text("[]")
-    with pytest.raises(RuntimeInputError, match=r"manifest.json was not written by"):
+    with pytest.raises(FacesynthError, match=r"manifest.json was not written by"):
         load(tmp_path)
 
 

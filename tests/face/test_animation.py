@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation, animate, gaze_of
-from facesynth.face.eyes import quiet_blinks, quiet_gaze
-from facesynth.face.rig import ARKIT_NAMES, gaze_weights
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.face.rig.eyes import quiet_blinks, quiet_gaze
+from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 
 def still(rig, count=240, fps=60.0, **extra):
-    from facesynth.face.markers import marker_layout
+    from facesynth.face.rig.markers import marker_layout
 
     layout = marker_layout(rig)
     return Motion(np.tile(layout.neutral, (count, 1)), fps, layout, **extra)
@@ -51,8 +51,8 @@ def test_own_eyes_are_used_and_scaled(rig):
 
 def test_the_head_moves_markers_as_the_motion_says(rig):
     """A pose about the rigid markers and one about the rig's pivot are the same movement of the points."""
-    from facesynth.face.markers import marker_vertices
-    from facesynth.face.rig import pose_points
+    from facesynth.face.rig.markers import marker_vertices
+    from facesynth.face.rig.rig import pose_points
     from facesynth.motion.pose import apply_head, rigid_points
 
     head = np.random.default_rng(0).normal(0, [0.2] * 3 + [5.0] * 3, (40, 6)).astype(np.float32)

@@ -5,9 +5,9 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import lsq_linear
 
-from facesynth.errors import FacesynthError
-from facesynth.face.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve, solve_markers
-from facesynth.motion.layout import Layout
+from facesynth.face.rig.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve, solve_markers
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 SPOKEN = {
     **{"jawOpen": 0.25, "mouthPucker": 0.3, "mouthFunnel": 0.2, "mouthStretch": 0.15, "mouthSmile": 0.3, "mouthRollLower": 0.2},
@@ -17,7 +17,7 @@ SPOKEN = {
 
 def speech_like(rig, count=300, fps=120.0, seed=0):
     """[T, 52] smooth weights of the shapes that speech uses, with closures of the lips."""
-    from facesynth.face.markers import LipGap
+    from facesynth.face.rig.markers import LipGap
 
     rng = np.random.default_rng(seed)
     weights = np.zeros((count, 52))
@@ -30,8 +30,8 @@ def speech_like(rig, count=300, fps=120.0, seed=0):
 
 
 def markers_of(rig, weights):
-    from facesynth.face.markers import marker_layout, marker_vertices
-    from facesynth.face.rig import pose_points
+    from facesynth.face.rig.markers import marker_layout, marker_vertices
+    from facesynth.face.rig.rig import pose_points
 
     layout = marker_layout(rig)
     return layout, pose_points(rig, marker_vertices(rig, layout), weights).reshape(len(weights), -1)
@@ -100,7 +100,7 @@ def test_noise_is_not_followed(rig):
 
 
 def test_lips_that_meet_on_the_markers_meet_on_the_face(rig):
-    from facesynth.face.markers import LipGap
+    from facesynth.face.rig.markers import LipGap
 
     weights = speech_like(rig)
     layout, frames = markers_of(rig, weights)
@@ -112,7 +112,7 @@ def test_lips_that_meet_on_the_markers_meet_on_the_face(rig):
 
 
 def test_a_lost_closure_is_brought_back(rig):
-    from facesynth.face.markers import LipGap
+    from facesynth.face.rig.markers import LipGap
 
     layout, frames = markers_of(rig, np.zeros((3, 52)))
     basis = MarkerBasis.of(rig, layout)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from own_heads import MAPPING, SHAPES
 
-from facesynth.errors import FacesynthError
-from facesynth.face.channel_map import Channel, ChannelMap, arkit_name, read_mapping
-from facesynth.face.rig import ARKIT_NAMES
+from facesynth.face.rig.channel_map import Channel, ChannelMap, arkit_name, read_mapping
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError
 
 
 def weights(**values):

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from facesynth.face.animation import animate
-from facesynth.face.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
-from facesynth.face.markers import LipGap, marker_layout
-from facesynth.face.rig import ARKIT_NAMES
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack
+from facesynth.face.rig.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
+from facesynth.face.rig.markers import LipGap, marker_layout
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 
 FPS = 50.0
 PHONES = PhoneTrack(("aa", "b", "aa", "s", "aa"), np.array([0.4, 0.5, 0.9, 1.0, 1.4]))

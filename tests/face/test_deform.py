@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
-from facesynth.face.deform import (
+from facesynth.face.rig.deform import (
     REACH,
     SIGMA,
     MeshDistanceDeformer,
@@ -13,19 +12,20 @@ from facesynth.face.deform import (
     surface_distances,
     surface_weights,
 )
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 
 @pytest.fixture(scope="module")
 def layout(rig):
-    from facesynth.face.markers import marker_layout
+    from facesynth.face.rig.markers import marker_layout
 
     return marker_layout(rig)
 
 
 @pytest.fixture(scope="module")
 def vertices(rig, layout):
-    from facesynth.face.markers import marker_vertices
+    from facesynth.face.rig.markers import marker_vertices
 
     return marker_vertices(rig, layout)
 
@@ -107,7 +107,7 @@ def test_scalp_ears_and_shoulders_stay(rig, deformer, layout):
 
 
 def test_teeth_and_tongue_follow_the_jaw_and_not_the_lips(rig, deformer, layout, vertices):
-    from facesynth.face.rig import pose_points
+    from facesynth.face.rig.rig import pose_points
 
     inner = rig.vertices_of("lower_teeth", "tongue")
     for shape, weight in (("jawOpen", 0.4), ("mouthLowerDownLeft", 0.8), ("mouthPucker", 0.8)):

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import animate
-from facesynth.face.fitting import fit_layout, is_of_the_head, rest_of, similarity
-from facesynth.face.markers import LipGap, marker_layout, marker_vertices
-from facesynth.face.rig import ARKIT_NAMES, pose_points
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.fitting import fit_layout, is_of_the_head, rest_of, similarity
+from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
+from facesynth.face.rig.rig import ARKIT_NAMES, pose_points
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 SCALE = 1.15
 TURN = Rotation.from_rotvec([0.1, -0.15, 0.05]).as_matrix()
@@ -75,7 +75,7 @@ def test_known_names_in_any_order_on_another_face_give_the_same_weights(rig, tal
 
 
 def test_names_of_landmarks_from_video_find_their_place(rig):
-    from facesynth.face.landmark_names import LANDMARKS
+    from facesynth.face.rig.landmark_names import LANDMARKS
 
     own = marker_layout(rig)
     names = tuple(f"p{number:03d}" for number in range(468))

@@ -3,9 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
-from facesynth.face.markers import LipGap, marker_layout, marker_vertices
-from facesynth.face.rig import ARKIT_NAMES, pose
+from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
+from facesynth.face.rig.rig import ARKIT_NAMES, pose
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ import pytest
 from own_heads import MAPPING, SHAPES, mask, write_mask, write_obj
 from scipy.spatial.transform import Rotation
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
+from facesynth.face.draw.own_render import OwnRenderer
 from facesynth.face.files.own import write_own
 from facesynth.face.own_animation import OwnAnimation, on_channels
-from facesynth.face.own_head import load_own_head
-from facesynth.face.own_render import OwnRenderer
-from facesynth.face.rig import ARKIT_NAMES
+from facesynth.face.rig.own_head import load_own_head
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError
 
 
 def animation(count=6):

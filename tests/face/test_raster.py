@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facesynth.face.raster import (
+from facesynth.face.draw.raster import (
     FAR,
     SAMPLES,
     TILE,

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
-from facesynth.face.deform import edge_lengths
-from facesynth.face.markers import marker_layout, marker_vertices
-from facesynth.face.regions import REGIONS, RegionDeformer, region_markers, region_shares
-from facesynth.face.rig import load_head
-from facesynth.motion.layout import Layout
+from facesynth.face.rig.deform import edge_lengths
+from facesynth.face.rig.markers import marker_layout, marker_vertices
+from facesynth.face.rig.regions import REGIONS, RegionDeformer, region_markers, region_shares
+from facesynth.face.rig.rig import load_head
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 pytest.importorskip("anny")
 

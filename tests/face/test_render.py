@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
-from facesynth.face import render
-from facesynth.face.bake import baked_head
-from facesynth.face.occlusion import sky_directions, sky_visibility
-from facesynth.face.render import Camera, Renderer
-from facesynth.face.rig import ARKIT_NAMES, pose
+from facesynth.face.draw import render
+from facesynth.face.draw.bake import baked_head
+from facesynth.face.draw.occlusion import sky_directions, sky_visibility
+from facesynth.face.draw.render import Camera, Renderer
+from facesynth.face.rig.rig import ARKIT_NAMES, pose
+from facesynth.inference.errors import FacesynthError
 
 SIZE = (160, 90)
 

@@ -3,14 +3,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import animate
-from facesynth.face.landmark_names import LANDMARKS
-from facesynth.face.markers import marker_layout, marker_vertices
-from facesynth.face.rig import load_head
-from facesynth.face.skin import marker_skin, on_head_markers, shown_blinks
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.landmark_names import LANDMARKS
+from facesynth.face.rig.markers import marker_layout, marker_vertices
+from facesynth.face.rig.rig import load_head
+from facesynth.face.rig.skin import marker_skin, on_head_markers, shown_blinks
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 pytest.importorskip("anny")
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
-from facesynth.face.subdivision import catmull_clark, refine_corners
+from facesynth.face.draw.subdivision import catmull_clark, refine_corners
+from facesynth.inference.errors import FacesynthError
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 CUBE_QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]

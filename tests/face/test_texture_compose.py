@@ -4,10 +4,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
 from facesynth.face.texture.compose import Report, TexturedFace, ping_pong
 from facesynth.face.texture.sources import coherent, nearest
 from facesynth.face.texture.speaker import Speaker, lower_face_window
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps
 
 HEIGHT, WIDTH = 90, 120

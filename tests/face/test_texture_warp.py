@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import mesh_of, ringed_mesh, signed_areas
 from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+from facesynth.inference.errors import FacesynthError
 
 HEIGHT, WIDTH = 48, 64
 

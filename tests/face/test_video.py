@@ -3,8 +3,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
-from facesynth.face.video import exact_rate, frame_count, read_video, write_video
+from facesynth.face.draw.video import exact_rate, frame_count, read_video, write_video
+from facesynth.inference.errors import FacesynthError
 
 SIZE = (48, 64)
 

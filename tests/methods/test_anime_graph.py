@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import PHONES
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at
 from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import blend
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
-from facesynth.speech.phones import PHONES
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,15 @@ import pytest
 import torch
 from corpora import tiny_corpus, tiny_layout
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack
 from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.mapping import MapSettings, Samples, fit_map
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import aligned, emotion_pairs, retakes, take_of
 from facesynth.methods.anime_graph.report import MapTrial, unit_cube_rms
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
 from facesynth.methods.anime_graph.closure import bilabial_spans
 from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
 from facesynth.methods.anime_graph.plan import blend
 from facesynth.methods.anime_graph.report import MapTrial
-from facesynth.motion.lips import lip_gap
 
 pytestmark = pytest.mark.slow
 

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.search import LookAhead, Step, Weights, best_path, jumps, look_ahead_path, path_cost
 
 PAPER = Weights()

@@ -10,18 +10,18 @@ from corpora import tiny_corpus
 from test_anime_search import random_steps
 
 from facesynth.config import load_config
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.warp import time_warp
 from facesynth.methods.anime_graph.candidates import pose_costs, stretched_motions
 from facesynth.methods.anime_graph.learning import NUMBERS, lattice_of, learn, mean_error
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import make_piece
 from facesynth.methods.anime_graph.search import Weights, best_path, path_cost
 from facesynth.methods.anime_graph.soft import mean_motion, soft_path
-from facesynth.methods.efase import prediction
-from facesynth.methods.efase.descent import Logs
+from facesynth.methods.learn import expectation as prediction
+from facesynth.methods.learn.descent import Logs
 from facesynth.methods.registry import load
-from facesynth.motion.warp import time_warp
 
 WEIGHTS = Weights(20.0, 1.0, 0.05, 3.0)
 SOFT = {"jump_weight": 10.0, "jump_cost_weight": 3.0, "audio_weight": 1.5, "pose_weight": 5.0, "temperature": 2.0}

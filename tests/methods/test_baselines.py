@@ -3,15 +3,15 @@ import pytest
 from corpora import tiny_corpus, tiny_layout
 
 from facesynth.corpus import Corpus, Record
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.geometry import marker_error
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
 from facesynth.methods.baselines.ridge import ALPHAS, Moments, Ridge
 from facesynth.methods.baselines.tcn import Tcn
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 METHODS = {"mean_face": MeanFace, "phone_mean": PhoneMean, "ridge": Ridge, "tcn": lambda: Tcn(steps=80)}
 QUICK = METHODS | {"tcn": lambda: Tcn(steps=3)}

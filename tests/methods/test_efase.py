@@ -13,15 +13,15 @@ from safetensors.torch import save_file
 
 from facesynth.config import load_config
 from facesynth.corpus import node_name
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import PHONES
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.efase.constraints import read_constraints
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.search import build_index, search
 from facesynth.methods.registry import create, load
-from facesynth.speech.phones import PHONES
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_intensity_runs_from_neutral_to_full_emotion(model, speech):
 
 
 def test_lips_close_after_a_blend_of_two_intensities(model, halves):
-    from facesynth.motion.lips import lip_gap
+    from facesynth.inference.lips import lip_gap
 
     for utterance in halves[1]:
         speech = utterance.speech

@@ -13,16 +13,17 @@ from scipy.ndimage import gaussian_filter1d
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
-from facesynth.methods.efase import descent, prediction
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.audio import pose_costs, pose_distances, sound_distances
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
-from facesynth.methods.efase.descent import Logs, descend
 from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.sharpening import matching_share, sharpen
+from facesynth.methods.learn import descent
+from facesynth.methods.learn import expectation as prediction
+from facesynth.methods.learn.descent import Logs, descend
 from facesynth.methods.registry import load
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
 from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.search import search

@@ -9,7 +9,8 @@ import torch
 from corpora import tiny_corpus
 from test_efase_search import literal, random_nodes, random_query
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.warp import time_warp
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
 from facesynth.methods.efase.costs import (
     Query,
@@ -25,7 +26,6 @@ from facesynth.methods.efase.search import build_index, search
 from facesynth.methods.efase.soft import Mixture, candidates, posterior, soft_search
 from facesynth.methods.efase.steps import CostWeights, step_terms, stretched
 from facesynth.methods.registry import load
-from facesynth.motion.warp import time_warp
 
 
 def all_targets(nodes, query, weights):

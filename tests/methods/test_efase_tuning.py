@@ -6,7 +6,7 @@ import pytest
 from corpora import tiny_corpus
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.tuning import CROWD, PUBLISHED, RANGES, examples_of, mean_error, split_for_tuning, tune
 

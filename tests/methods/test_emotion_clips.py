@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.clips import clips_of_corpus, clips_of_list
 from facesynth.methods.emotion.detector import DetectorSettings
 from facesynth.speech.audio import save_wav

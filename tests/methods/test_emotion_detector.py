@@ -3,7 +3,7 @@ import pytest
 import soundfile
 import torch
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.contours import contours
 from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
 from facesynth.methods.emotion.paper_features import paper_features

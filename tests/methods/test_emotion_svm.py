@@ -3,7 +3,7 @@ import pytest
 import torch
 from sklearn.svm import SVC, NuSVC
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.probabilities import couple, fit_sigmoid, vote
 from facesynth.methods.emotion.svm import KERNELS, Svm, SvmSettings
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import Clip, DetectorSettings
 from facesynth.methods.emotion.tables import COEFFICIENTS, Recognition, recognise, table_one
 

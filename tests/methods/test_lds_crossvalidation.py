@@ -3,15 +3,15 @@ import pytest
 from simulated_lds import random_truth
 
 from facesynth.corpus import Corpus, Record
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.crossvalidation import Errors, cross_validate, table
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 from facesynth.methods.lds.prediction import innovations, one_step
 from facesynth.methods.lds.rollout import Rollout
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 QUICK = {"features": 2, "components": 2, "rows": 4, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated_lds import errors, pole_error, random_truth, recording, transfer_error
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
 from facesynth.methods.lds.identification import fitting_rows, identify
 from facesynth.methods.lds.regression import solve, triangle

@@ -10,16 +10,16 @@ from corpora import tiny_corpus, tiny_layout
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus, Record
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.innovations import Innovations
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.orders import folds, plainest_good
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.system import Clip
 from facesynth.methods.registry import load
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 QUICK = {"features": 4, "components": 4, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
 

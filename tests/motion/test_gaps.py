@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.gaps import Gap, fill_gaps, runs
 
 FPS = 120.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.ica import Ica
 
 MIXING = np.array([[3.0, 0.5, 0.1], [1.0, -2.0, 0.2], [0.3, 0.4, 1.0]])

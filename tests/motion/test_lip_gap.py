@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from corpora import tiny_layout
 
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.lips import lip_gap
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.motion import Motion
 
 
 def test_mean_height_between_the_pairs():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pca import Pca
 
 

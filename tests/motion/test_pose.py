@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.motion.pose import apply_head, fill_head, remove_head, rigid_points
 
 LAYOUT = tiny_layout()

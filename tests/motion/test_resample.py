@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from corpora import tiny_layout, tiny_utterances
 
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 from facesynth.motion.resample import resample
 
 CURVE = Layout("curves", ("jawOpen",))

@@ -4,8 +4,8 @@ import os
 
 import numpy as np
 
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.performer.performance import perform
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 RATE = 16000
 BILABIAL_RICH = "m ay b r ah dh er b ao t f ay v b l uw b aa k s ih z p ae m m ey b iy w iy w ih l ow p ah n dh eh m"

@@ -2,12 +2,12 @@
 
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 
 @pytest.fixture(scope="session")
 def rig():
-    from facesynth.face.rig import load_head
+    from facesynth.face.rig.rig import load_head
 
     try:
         return load_head()
@@ -17,7 +17,7 @@ def rig():
 
 @pytest.fixture(scope="session")
 def lips(rig):
-    from facesynth.face.markers import LipGap
+    from facesynth.face.rig.markers import LipGap
 
     return LipGap.of(rig)
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from acting import BILABIAL_RICH, per_phone, phone_track
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import BILABIALS, LABIODENTALS, PHONES
+from facesynth.inference.speech import PhoneTrack
 from facesynth.performer.articulation import LOOSEST_MM, TIGHTEST_MM, articulate
 from facesynth.performer.targets import CURVES, load_targets
-from facesynth.speech.phones import BILABIALS, LABIODENTALS, PHONES
-from facesynth.speech.speech import PhoneTrack
 
 FPS = 120.0
 

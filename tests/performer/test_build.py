@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 from acting import per_phone, vanish
 
-from facesynth.corpus.check import check
+from facesynth.corpus.checks.check import check
 from facesynth.corpus.corpus import Corpus
-from facesynth.errors import FacesynthError
-from facesynth.motion.lips import lip_gap
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import lip_gap
+from facesynth.inference.phones import BILABIALS
 from facesynth.performer import build, stage
 from facesynth.performer import capture as stage_capture
 from facesynth.performer.build import build_performer
 from facesynth.performer.script import Sentence, load_script
 from facesynth.performer.takes import takes_of
 from facesynth.performer.truth import contaminated_nodes, read_truth
-from facesynth.speech.phones import BILABIALS
 
 SCRIPT = (Sentence(1, "Stop it right now!"), Sentence(2, "Maybe my mother was home."))
 

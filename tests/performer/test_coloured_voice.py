@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.performer import voice as voice_room
 from facesynth.performer.lines import DEMO_LINES, speak_lines
 from facesynth.performer.prosody import EMOTIONS, analyse, colour

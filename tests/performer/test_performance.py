@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from acting import BILABIAL_RICH, act, hum, per_phone, speech_of
 
-from facesynth.errors import FacesynthError
-from facesynth.face.rig import ARKIT_NAMES
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import BILABIALS, OPEN_VOWELS
+from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.performer.articulation import LOOSEST_MM
 from facesynth.performer.cues import listen
 from facesynth.performer.prosody import EMOTIONS
-from facesynth.speech.phones import BILABIALS, OPEN_VOWELS
-from facesynth.speech.speech import EmotionTrack, Speech
 
 TALK = "dh ah s ih ng er s t aa r t ih d t uw l ae f ae n d w iy ao l hh er d ih t s uw n ae f t er w er d z"
 

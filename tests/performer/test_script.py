@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import BILABIALS, LABIODENTALS, PHONES
 from facesynth.performer.script import SMALL, diphones_of, greedy_order, load_script, phones_of
-from facesynth.speech.phones import BILABIALS, LABIODENTALS, PHONES
 
 ARPABET = frozenset(PHONES) - {"ax", "el", "em", "en"}
 """What cmudict writes; the other four are reduced forms of them."""

@@ -3,10 +3,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import SILENCE
 from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, loudest_db
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.pronunciation import pronunciations
 from facesynth.speech.recognition import _pieces, recognise
 from facesynth.speech.transcript import words_of

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import load_audio, require_sound, resample, save_wav
 
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import EmotionTrack
 from facesynth.speech.emotions import read_emotions, write_emotions
-from facesynth.speech.speech import EmotionTrack
 
 
 def read(tmp_path, text, duration_s=3.0):

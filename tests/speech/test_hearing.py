@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.audio import save_wav
 from facesynth.speech.hearing import hear
-from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.textgrid import write_label_lines, write_textgrid
 
 TRACK = PhoneTrack(("pau", "m", "aa", "pau"), np.array([0.2, 0.3, 0.8, 1.0]))

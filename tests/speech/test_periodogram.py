@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.periodogram import COEFFICIENTS, RATE, Periodogram
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
 
 RATES = (25.0, 30000 / 1001, 30.0, 60.0, 120.0)
 

@@ -1,7 +1,7 @@
 import pytest
 
-from facesynth.errors import FacesynthError
-from facesynth.speech.phones import (
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import (
     BILABIALS,
     LABIODENTALS,
     OPEN_VOWELS,

@@ -3,9 +3,9 @@ import re
 
 import pytest
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import PHONES
 from facesynth.speech.letter_to_sound import sound_out, spell_out
-from facesynth.speech.phones import PHONES
 from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
 from facesynth.speech.transcript import words_of
 

@@ -4,7 +4,7 @@ import torch
 from scipy.linalg import solve_toeplitz
 from scipy.signal import butter, freqz, lfilter
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.rasta_plp import (
     RastaPlp,
     critical_bands,

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from facesynth.errors import FacesynthError
-from facesynth.speech.phones import PHONES
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import PHONES
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.segments import covering, in_one, phone_track, within
-from facesynth.speech.speech import PhoneTrack
 from facesynth.speech.textgrid import read_label_lines, read_textgrid, write_label_lines, write_textgrid
 
 TRACK = PhoneTrack(("pau", "hh", "ah", "l", "ow", "pau"), np.array([0.1, 0.2, 1 / 3, 0.4, 0.55, 0.9]))

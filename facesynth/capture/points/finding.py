@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from facesynth.capture.points.region import FaceRegion
 from facesynth.capture.square import Image
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 Box = Sequence[float]
 """Left, top, right, bottom px, forehead to chin."""

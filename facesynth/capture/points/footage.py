@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from facesynth.capture.square import Image
 from facesynth.capture.video import open_video
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 UNSTEADY = 0.25
 """Of the median step between frames: steps that differ by more make the rate variable."""

@@ -14,7 +14,7 @@ from facesynth.capture.points.footage import Footage, read_footage
 from facesynth.capture.points.reference import Following, Reference
 from facesynth.capture.points.shapes import Shapes
 from facesynth.capture.points.tracking import Drift
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps
 
 VERSION = 1

@@ -16,7 +16,7 @@ from facesynth.capture.points.footage import Footage
 from facesynth.capture.points.region import FaceRegion
 from facesynth.capture.points.shapes import Shapes, mean_shape, shapes_of
 from facesynth.capture.points.tracking import Drift, Grey, Points, corners, drift, follow_clip
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 
 COUNT = 200

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.capture.points.tracking import Points, neighbours_mean
+from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import fill_gaps
-from facesynth.motion.motion import Motion
 from facesynth.motion.planar import HeadMaps, motion_frames, tracked_layout
 
 ROBUST_ROUNDS = 5

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, require_file
 from facesynth.corpus.importers.tables import load_mat
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.speech.segments import Segment, phone_track
 
 FIELDS = {"NAME", "SRATE", "SIGNAL"}

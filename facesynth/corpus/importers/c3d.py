@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.importers.description import UNITS_MM, Written
 from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, require_file
-from facesynth.errors import FacesynthError, unknown
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Layout
 
 SOUNDS = ("audio", "sound", "mic", "voice", "speech")
 """What analog channels that hold sound are called."""

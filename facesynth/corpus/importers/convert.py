@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from facesynth.atomic import atomic_path, write_text
+from facesynth.corpus.add.recordings import AUDIO, VIDEO, Recording, find_recordings
 from facesynth.corpus.importers.description import LAYOUT, Description, description_text
 from facesynth.corpus.importers.formats import SUFFIXES, read
 from facesynth.corpus.importers.reading import Reading
 from facesynth.corpus.importers.session import Session, survey
 from facesynth.corpus.motion_files import with_points_of
-from facesynth.corpus.recordings import AUDIO, VIDEO, Recording, find_recordings
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.textgrid import write_textgrid

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError, unknown
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Layout
 
 LAYOUT = "layout.yaml"
 """Beside recordings, or in their corpus."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 WIDE_RAD = np.radians(30)
 """A jaw that is turned so far is wide open: weight 1."""

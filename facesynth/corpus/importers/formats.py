@@ -11,8 +11,8 @@ from facesynth.corpus.importers.flame import is_flame, read_flame
 from facesynth.corpus.importers.livelink import is_live_link, read_livelink_motion
 from facesynth.corpus.importers.reading import Reading, require_file
 from facesynth.corpus.importers.tables import load_mat, read_arrays, read_table
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 SUFFIXES = frozenset({".c3d", ".csv", ".npz", ".mat"})
 

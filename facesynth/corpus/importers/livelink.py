@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 
 FIRST = ("Timecode", "BlendshapeCount")
 LIVE_LINK = b"Timecode,BlendshapeCount,"

@@ -22,11 +22,11 @@ from facesynth.capture.points.footage import Footage, read_footage
 from facesynth.capture.points.kept_shapes import kept_shapes, load_shapes, save_shapes
 from facesynth.capture.points.reference import Reference
 from facesynth.capture.points.shapes import Shapes
+from facesynth.corpus.add.recordings import VIDEO, Recording, find_recordings
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import check_id
-from facesynth.corpus.recordings import VIDEO, Recording, find_recordings
-from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.motion.planar import tracked_layout
 from facesynth.motion.resample import resample
 from facesynth.progress import track

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.segments import Segment
-from facesynth.speech.speech import PhoneTrack
 
 LARGEST_BYTES = 2**31
 """Files that are larger hold more than one recording, or are damaged."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.capture.clock import Recorder
-from facesynth.corpus.recordings import VIDEO, find_recordings
-from facesynth.errors import FacesynthError
+from facesynth.corpus.add.recordings import VIDEO, find_recordings
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio, save_wav
 

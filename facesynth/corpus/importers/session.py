@@ -18,8 +18,8 @@ from facesynth.corpus.importers.axes import axes_by_names
 from facesynth.corpus.importers.description import Description, Written, description_text, read_description, turned
 from facesynth.corpus.importers.formats import read
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.motion.point_groups import guess_groups, spans_a_plane
 from facesynth.motion.pose import remove_head
 

@@ -17,8 +17,8 @@ from facesynth.corpus.importers.description import ORDER, Written
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.motion_files import read_csv, shortened, time_column
 from facesynth.corpus.npz import require_modest
-from facesynth.errors import FacesynthError, unknown
-from facesynth.motion.layout import Kind, Layout
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Kind, Layout
 
 CHANNELS = "channels.txt"
 """Beside weights: the names of the columns, one a line."""

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.atomic import write_text
+from facesynth.corpus.add.given import Given
+from facesynth.corpus.add.recordings import VIDEO, Recording, words_of
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.eyes import NO_SPEECH
-from facesynth.corpus.given import Given
 from facesynth.corpus.importers.formats import read
 from facesynth.corpus.importers.reading import Reading
 from facesynth.corpus.importers.session import kept_written
 from facesynth.corpus.motion_files import into_corpus
-from facesynth.corpus.recordings import VIDEO, Recording, words_of
-from facesynth.errors import FacesynthError
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import SILENCE
 from facesynth.speech.audio import save_wav
-from facesynth.speech.phones import SILENCE
 from facesynth.speech.textgrid import write_textgrid
 
 QUIET = "no speech.lab"

@@ -15,12 +15,12 @@ from facesynth.capture.landmarks import OUTER_CORNERS_MM, landmark_layout
 from facesynth.capture.motion import motion_of
 from facesynth.capture.shape import neutral_shape
 from facesynth.capture.track import Track
+from facesynth.corpus.add.recordings import VIDEO, find_recordings
 from facesynth.corpus.corpus import Corpus
-from facesynth.corpus.recordings import VIDEO, find_recordings
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.errors import FacesynthError
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 from facesynth.motion.resample import resample
 from facesynth.speech.audio import load_audio
 

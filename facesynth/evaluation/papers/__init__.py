@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from facesynth.corpus import Corpus
-from facesynth.errors import unknown
 from facesynth.evaluation.folds import make_folds, minutes_of, some_of
 from facesynth.evaluation.papers.finding import Finding, Reproduction
+from facesynth.inference.errors import unknown
 
 REFERENCES = {
     "cao2005": "Cao, Tien, Faloutsos, Pighin: Expressive Speech-Driven Facial Animation, ACM TOG 2005",

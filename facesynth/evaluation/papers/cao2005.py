@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from facesynth.errors import FacesynthError
 from facesynth.evaluation.cost import stopwatch
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.finding import Finding, not_available, values
 from facesynth.evaluation.papers.joined import joined, phones_until
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
 from facesynth.methods.anime_graph.report import MapTrial

@@ -12,9 +12,9 @@ from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented, values
 from facesynth.evaluation.papers.joined import joined
 from facesynth.evaluation.trajectories import shown_channels
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
 from facesynth.methods.efase.method import Efase
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import Speech
 
 PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 PHONES = (14, 24, 53, 63)
@@ -33,7 +33,7 @@ def findings(material: Material) -> list[Finding]:
         *trajectories(spoken, "figs 15, 16"),
         not_available("table 5", "the same on a graphics card, s", values(SECONDS_GPU), "measured on the processor alone"),
         not_implemented("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps"),
-        not_available("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.deform`"),
+        not_available("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.rig.deform`"),
     ]
 
 

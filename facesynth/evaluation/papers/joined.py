@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
-from facesynth.speech.speech import EmotionTrack, PhoneTrack, Speech
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 
 
 def joined(speeches: Sequence[Speech], phones: int) -> Speech:

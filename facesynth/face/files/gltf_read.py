@@ -12,7 +12,7 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 LARGEST_BYTES = 2**30
 MOST_VALUES = 4 * 10**8

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import write_text
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, rate_of, timecode
-from facesynth.face.rig import ARKIT_NAMES
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
 HEADER = ("Timecode", "BlendshapeCount", *(name[0].upper() + name[1:] for name in ARKIT_NAMES), *ANGLES)

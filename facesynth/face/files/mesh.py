@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.rig import PARTS, Rig
+from facesynth.face.rig.rig import PARTS, Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.atomic import atomic_path
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 _ANIMATION = ("names", "weights", "head", "gaze", "tongue_up", "fps")
 

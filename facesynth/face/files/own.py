@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.atomic import atomic_path
-from facesynth.errors import unknown
+from facesynth.face.draw.raster import vertex_normals
 from facesynth.face.files.curves import write_curves
 from facesynth.face.files.gltf_buffer import Buffer
 from facesynth.face.files.gltf_read import read_document, read_scene, target_names
 from facesynth.face.own_animation import OwnAnimation
-from facesynth.face.own_head import OwnHead
-from facesynth.face.raster import vertex_normals
+from facesynth.face.rig.own_head import OwnHead
+from facesynth.inference.errors import unknown
 
 SUFFIXES = (".glb", ".csv", ".npz")
 M_PER_MM = 1e-3

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 _TIMECODE = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d):(\d{2,3})(\.\d+)?")
 

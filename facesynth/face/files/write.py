@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facesynth.errors import FacesynthError, unknown
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig import ARKIT_NAMES, Rig
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.motion import Motion
 
 SUFFIXES: tuple[str, ...] = (".csv", ".glb", ".npz", ".bvh")
 

@@ -12,11 +12,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import Mesh, ringed_mesh
 from facesynth.face.texture.sources import coherent, nearest
 from facesynth.face.texture.speaker import Speaker, within
 from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps
 
 BATCH = 4

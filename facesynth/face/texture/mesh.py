@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 RING_POINTS = 32
 RING_DISTANCE = 0.25

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 
 CANDIDATES = 48
 """Nearest training shapes that are considered for each frame."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
-from facesynth.errors import FacesynthError
 from facesynth.face.texture.mesh import ringed_mesh
+from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16

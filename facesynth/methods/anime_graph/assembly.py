@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.warp import time_warp
 from facesynth.methods.anime_graph.audio_cost import audio_costs, warp_path
 from facesynth.methods.anime_graph.candidates import Chooser
-from facesynth.motion.warp import time_warp
 
 VELOCITY_LASTS_S = 0.04
 """Time constant with which an extrapolated movement comes to rest."""

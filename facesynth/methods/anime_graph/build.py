@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Utterance, node_name
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.motion.layout import Layout
-from facesynth.speech.phones import BILABIALS
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.layout import Layout
+from facesynth.inference.phones import BILABIALS
+from facesynth.inference.speech import PhoneTrack
 
 SHUT_SHARE = 0.25
 """Lips count as shut up to this share of the way from the narrowest gap to a wide one …"""

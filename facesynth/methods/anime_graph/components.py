@@ -9,9 +9,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.motion.ica import Ica
-from facesynth.motion.layout import Layout
 from facesynth.motion.pca import Pca
 
 UPPER_GROUPS = ("brows", "eyelids", "upper_face", "forehead", "rigid")

@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.speech.audio import resample
 from facesynth.speech.rasta_plp import RastaPlp
-from facesynth.speech.speech import PhoneTrack, Speech
 
 RATE = 16000
 SMALLEST_SWING = 1e-4

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.speech.phones import PHONES, viseme_of
+from facesynth.inference.phones import PHONES, viseme_of
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]

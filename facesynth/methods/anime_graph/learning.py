@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.candidates import stretched_motions
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import lay_steps
 from facesynth.methods.anime_graph.soft import step_terms
-from facesynth.methods.efase.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.efase.sharpening import matching_share
 from facesynth.methods.efase.soft import posterior
+from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.progress import track
 
 NUMBERS = ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")

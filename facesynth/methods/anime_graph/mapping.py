@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split
 from facesynth.motion.rbf import KERNELS, Kernel, RbfMap, closest_distance, cluster_means, median_distance

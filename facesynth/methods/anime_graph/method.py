@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from torch import nn
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import PHONES
+from facesynth.inference.speech import Speech
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at, keep_shut, narrowest_gaps
@@ -38,15 +41,12 @@ from facesynth.methods.anime_graph.search import Weights
 from facesynth.methods.anime_graph.soft import mean_motion
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import FaceStream, Stream
-from facesynth.methods.efase.prediction import PosePredictor
 from facesynth.methods.efase.sharpening import sharpen
+from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 from facesynth.motion.rbf import Kernel
 from facesynth.progress import track
-from facesynth.speech.phones import PHONES
-from facesynth.speech.speech import Speech
 
 MOST_FRAMES = 60_000
 """Of more training frames than this, evenly spaced ones are enough to find the components."""

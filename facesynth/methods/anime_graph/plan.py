@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.phones import PHONES
 from facesynth.methods.anime_graph.assembly import Blender, Piece, warped
 from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
 from facesynth.methods.anime_graph.search import Step, Weights, best_path, jumps, look_ahead_path, path_cost
-from facesynth.speech.phones import PHONES
 
 
 @dataclass(frozen=True, eq=False)

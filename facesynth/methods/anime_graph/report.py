@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.mapping import (
@@ -24,7 +25,6 @@ from facesynth.methods.anime_graph.mapping import (
 )
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split
-from facesynth.motion.layout import Layout
 from facesynth.motion.rbf import KERNELS, RbfMap
 from facesynth.progress import track
 

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.plan import Plan, make_piece
 from facesynth.methods.anime_graph.search import Step, Weights

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.components import FaceComponents, block_columns
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs, retakes
-from facesynth.motion.layout import Layout
 
 RATIO = 2.0
 """A component is emotional when emotions change it this much more (RMS) than another take of the same does."""

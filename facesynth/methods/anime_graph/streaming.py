@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.phones import BILABIALS, PHONES
 from facesynth.methods.anime_graph.assembly import Blender
 from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
 from facesynth.methods.anime_graph.closure import ClosingLips
@@ -12,7 +13,6 @@ from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.lowpass import low_pass
 from facesynth.methods.anime_graph.plan import Wish, make_piece
 from facesynth.methods.anime_graph.search import LookAhead, Step, Weights, best_path, path_cost
-from facesynth.speech.phones import BILABIALS, PHONES
 
 FILTER_SETTLES_S = 0.25
 """The zero-phase filter needs to see this much of what follows a frame."""

@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.methods.baselines.frames import mean_pose, refuse_options
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
+from facesynth.methods.learn.frames import mean_pose, refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import Speech
 
 
 @register("mean_face")

@@ -12,11 +12,11 @@ from scipy.interpolate import PchipInterpolator
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.methods.baselines.frames import PoseSum, mean_pose, refuse_options
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
-from facesynth.speech.speech import PhoneTrack, Speech
 
 ANY = ""
 """Stands for any emotion."""

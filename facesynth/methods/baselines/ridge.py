@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
-from facesynth.methods.baselines.frames import complete, complete_frames, refuse_options
-from facesynth.methods.baselines.hearing import Hearing
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
+from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
+from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 from facesynth.motion.pca import Pca
 from facesynth.progress import track
-from facesynth.speech.speech import Speech
 
 OFFSETS_S = np.linspace(-0.2, 0.2, 21)
 """Where around a frame the sound is heard, s."""

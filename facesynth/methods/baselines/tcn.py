@@ -10,15 +10,15 @@ from scipy.interpolate import CubicSpline
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
-from facesynth.methods.baselines.frames import complete, complete_frames, refuse_options
-from facesynth.methods.baselines.hearing import Hearing
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
+from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
+from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 from facesynth.motion.pca import Pca
 from facesynth.progress import track
-from facesynth.speech.speech import Speech
 
 RATE = 50.0
 """Frames of sound that the network reads per second, Hz: the 20 ms of the ridge's 21 frames."""

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, node_name
-from facesynth.errors import FacesynthError
-from facesynth.methods.baselines.hearing import Hearing
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import Speech
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
-from facesynth.methods.efase.prediction import PosePredictor
 from facesynth.methods.efase.steps import stretched
+from facesynth.methods.learn.expectation import PosePredictor
+from facesynth.methods.learn.hearing import Hearing
 from facesynth.motion.pca import Pca
-from facesynth.speech.speech import Speech
 
 SPAN = (-0.25, 1.25)
 """From where to where the sound of a phone is taken, in parts of its duration."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from facesynth.inference.layout import Layout
 from facesynth.methods.efase.nodes import Floats, Ints
-from facesynth.motion.layout import Layout
 
 CLOSE_S = 0.03
 """How fast a correction fades."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from facesynth.inference.warp import time_warp
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
 from facesynth.methods.efase.soft import Mixture, mean_motion
 from facesynth.motion.smoothing import smooth_joint
-from facesynth.motion.warp import time_warp
 
 FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
 """Phones whose shape must survive the smoothing (Deng 2008, §6.3)."""

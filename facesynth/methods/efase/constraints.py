@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.corpus import node_name
-from facesynth.errors import FacesynthError
-from facesynth.speech.speech import PhoneTrack
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import PhoneTrack
 
 
 def read_constraints(path: str | Path, phones: PhoneTrack) -> dict[int, str]:

@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.warp import time_warp
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
-from facesynth.motion.warp import time_warp
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ import numpy as np
 import torch
 
 from facesynth.corpus import Corpus, Utterance, node_name
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import PHONES, SILENCE, viseme_of
 from facesynth.methods.efase.nodes import Floats, MotionNodes
-from facesynth.motion.motion import Motion
 from facesynth.motion.pca import Pca
 from facesynth.motion.resample import resample
 from facesynth.progress import track
-from facesynth.speech.phones import PHONES, SILENCE, viseme_of
 
 
 @dataclass(frozen=True, eq=False)

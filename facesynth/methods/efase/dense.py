@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from facesynth.inference.warp import time_warp
 from facesynth.methods.efase.costs import Query, Weights, end_vectors, path_cost, start_vectors, target_costs
 from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.search import Path
-from facesynth.motion.warp import time_warp
 
 BLOCK = 256
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from facesynth.inference.phones import PHONES
 from facesynth.methods.efase.costs import (
     Query,
     Weights,
@@ -18,7 +19,6 @@ from facesynth.methods.efase.costs import (
     transition_cost,
 )
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
-from facesynth.speech.phones import PHONES
 
 CLOSEST = 64
 """Replacements whose exact cost is computed, the nearest by joints."""

@@ -18,10 +18,9 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.audio import pose_distances
 from facesynth.methods.efase.costs import Query, target_costs
-from facesynth.methods.efase.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.penalty import median_transition
@@ -29,6 +28,7 @@ from facesynth.methods.efase.plan import part, stretches
 from facesynth.methods.efase.sharpening import matching_share
 from facesynth.methods.efase.soft import candidates, posterior
 from facesynth.methods.efase.steps import CostWeights, StepTerms, step_terms, stretched
+from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.motion.resample import resample
 from facesynth.progress import track
 

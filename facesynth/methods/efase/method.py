@@ -11,7 +11,10 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.motion import Motion
+from facesynth.inference.phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
+from facesynth.inference.speech import Speech
 from facesynth.methods.efase.audio import AudioTerms, Expected
 from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
@@ -29,11 +32,8 @@ from facesynth.methods.efase.soft import Mixture, soft_search
 from facesynth.methods.efase.trees import Forest
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 from facesynth.motion.pca import Pca
 from facesynth.motion.resample import resample
-from facesynth.speech.phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
-from facesynth.speech.speech import Speech
 
 NODE_FIELDS = ("starts", "stops", "phones", "visemes", "emotions", "before", "after")
 FOREST_FIELDS = ("order", "starts", "stops", "left", "right", "centres", "radii", "roots", "tree_of")

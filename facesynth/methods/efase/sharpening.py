@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from facesynth.inference.motion import Motion
 from facesynth.methods.efase.nodes import Floats
-from facesynth.motion.motion import Motion
 
 QUICK_S = 0.08
 """Standard deviation of the smoothing that parts slow movement from quick."""

@@ -23,7 +23,7 @@ from scipy.optimize import differential_evolution
 from tqdm import tqdm
 
 from facesynth.corpus import Corpus, Record, Utterance
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.concatenation import concatenate
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import Floats

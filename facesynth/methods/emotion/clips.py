@@ -6,7 +6,7 @@ import csv
 from pathlib import Path
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.emotion.detector import Clip
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from facesynth.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.emotion.probabilities import couple, fit_sigmoid, vote
 
 Kernel = Literal["linear", "polynomial", "radial"]

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
 from facesynth.methods.emotion.svm import Kernel
 from facesynth.progress import track

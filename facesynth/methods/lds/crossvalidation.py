@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.ridge import Moments, Ridge
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.prediction import one_step
-from facesynth.motion.motion import Motion
 
 SAMPLES = 10
 PENALTY = 1e-3

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
 from facesynth.methods.lds.stochastic import FEWEST_ROWS, noise_rows, predictor_space, realise
 from facesynth.methods.lds.system import Array, Clip, LinearSystem

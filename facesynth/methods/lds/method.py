@@ -9,7 +9,9 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
 from facesynth.methods.lds.features import Standardised
 from facesynth.methods.lds.identification import fitting_rows, identify
 from facesynth.methods.lds.innovations import Innovations, innovations_of
@@ -19,9 +21,7 @@ from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, pl
 from facesynth.methods.lds.system import Array, Clip, LinearSystem
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.motion import Motion
 from facesynth.speech.periodogram import Periodogram, Scale
-from facesynth.speech.speech import Speech
 
 SETTLING_S = 4.0
 """How long the noise runs before the first frame, so that it starts as it goes on."""

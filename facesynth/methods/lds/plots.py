@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.lds.method import LDS
 
 SOURCES_SHOWN = 8

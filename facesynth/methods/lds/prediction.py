@@ -6,11 +6,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.system import Array, Clip
-from facesynth.speech.speech import Speech
 
 
 def one_step(model: LDS, speech: Speech, frames: Array) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 from facesynth.speech.audio import resample
 from facesynth.speech.periodogram import RATE, Periodogram

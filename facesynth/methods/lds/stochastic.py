@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import cholesky, solve_discrete_are, solve_triangular, svd
 
-from facesynth.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.lds.deterministic import stabilised
 from facesynth.methods.lds.regression import solve, triangle
 from facesynth.methods.lds.system import Array, Stochastic

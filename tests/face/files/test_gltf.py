@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files import write_animation
-from facesynth.face.rig import ARKIT_NAMES, gaze_weights, pose
+from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights, pose
 
 _spec = importlib.util.spec_from_file_location("gltf_rules", Path(__file__).with_name("gltf_rules.py"))
 gltf_rules = importlib.util.module_from_spec(_spec)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facesynth.errors import FacesynthError
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files import SUFFIXES, write_animation
 from facesynth.face.files.livelink import COUNT, HEADER, read_livelink, take_of, write_livelink
 from facesynth.face.files.npz import read_npz
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, timecode
-from facesynth.face.rig import ARKIT_NAMES, PIVOT_MM
-from facesynth.motion.layout import Layout
-from facesynth.motion.motion import Motion
+from facesynth.face.rig.rig import ARKIT_NAMES, PIVOT_MM
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
 
 RATES = [24000 / 1001, 24.0, 25.0, 30000 / 1001, 30.0, 60000 / 1001, 60.0, 120.0]
 

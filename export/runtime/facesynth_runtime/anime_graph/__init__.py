@@ -1,5 +1,0 @@
-"""The anime graph: recorded phones found by sound, joined by example, mapped between emotions."""
-
-from facesynth_runtime.anime_graph.model import AnimeGraph
-
-__all__ = ["AnimeGraph"]

@@ -1,0 +1,1 @@
+"""Pictures of heads, drawn by the processor alone."""

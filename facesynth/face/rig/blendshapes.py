@@ -1,0 +1,193 @@
+"""Weights of a rig's shapes from the motion of markers: bounded, temporally regularised least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from facesynth.face.rig.markers import marker_vertices
+from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
+
+if TYPE_CHECKING:
+    from facesynth.face.rig.fitting import LayoutFit
+
+TOLERANCE = 2e-5
+"""The solver stops when a sweep over all weights moves none by more than this."""
+MAX_SWEEPS = 2000
+RIDGE = 2e-4
+"""Share of the mean squared shape length that a shape pays for being used."""
+SMOOTHING_S = 0.003
+"""Time constant with which a weight that nothing else explains follows its markers."""
+GAP_WEIGHT = 4.0
+"""Importance of a squared millimetre of lip gap beside one of marker distance."""
+
+SHY: Mapping[str, float] = MappingProxyType(
+    {"mouthDimple": 8.0, "mouthPress": 8.0, "mouthShrugLower": 4.0, "mouthClose": 2.0, "eyeWide": 2.0, "browInnerUp": 0.5}
+)
+"""Ridge factors where two shapes look nearly alike on markers (cosines of .8 to .96): the rarer one holds back."""
+
+UNSEEN: tuple[str, ...] = ("tongueOut", *(name for name in ARKIT_NAMES if name.startswith("eyeLook")))
+"""Shapes that skin markers hardly see: they follow from the phones and from the gaze, not from a solve."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerBasis:
+    """What each shape of a rig does to the markers of a layout."""
+
+    shapes_mm: NDArray[np.float64]
+    """[52, 3K] displacement of the markers at weight 1."""
+    rest_mm: NDArray[np.float64]
+    """[3K] markers at rest: the layout's neutral pose, or the rig's."""
+    ridge: NDArray[np.float64]
+    """[52] mm² that a weight of 1 costs."""
+    free: NDArray[np.bool_]
+    """[52] shapes that are solved for; the others keep the weights they are given."""
+    gap_rows: NDArray[np.float64]
+    """[P, 3K] picks the vertical distance of each pair of facing lip markers."""
+
+    @classmethod
+    def of(cls, rig: Rig, layout: Layout) -> MarkerBasis:
+        """Read the basis off a rig; the layout's names must be those of the head's markers."""
+        if layout.kind != "markers":
+            raise FacesynthError(f"weights are solved from 3-D markers in mm; got a layout of {layout.kind}")
+        vertices = marker_vertices(rig, layout)
+        rest = rig.rest_mm[vertices].ravel() if layout.neutral is None else np.asarray(layout.neutral)
+        return cls._at(rig, vertices, rest, layout.lip_pairs, np.ones(3))
+
+    @classmethod
+    def fitted(cls, rig: Rig, layout: Layout, fit: LayoutFit) -> MarkerBasis:
+        """The basis of points that a fit has put on the head; of 2-D points nothing is known along the third axis."""
+        pairs = tuple((int(upper), int(lower)) for upper, lower in fit.lip_pairs)
+        seen = np.array([1.0, 1.0, float(layout.dimension == 3)])
+        return cls._at(rig, fit.vertices, rig.rest_mm[fit.vertices].ravel(), pairs, seen)
+
+    @classmethod
+    def _at(
+        cls, rig: Rig, vertices: NDArray[np.int64], rest: ArrayLike, pairs: tuple[tuple[int, int], ...], seen: NDArray[np.float64]
+    ) -> MarkerBasis:
+        shapes = (rig.shapes_mm[:, vertices] * seen).reshape(len(rig.names), -1).astype(np.float64)
+        factors = np.array([SHY.get(name.removesuffix("Left").removesuffix("Right"), 1.0) for name in rig.names])
+        free = np.array([name not in UNSEEN for name in rig.names]) & (shapes**2).any(axis=1)
+        ridge = RIDGE * (shapes[free] ** 2).sum(axis=1).mean() * factors if free.any() else factors
+        return cls(shapes, np.asarray(rest, np.float64), ridge, free, _gap_rows(pairs, len(vertices)))
+
+
+def solve(
+    shapes: ArrayLike,
+    targets: ArrayLike,
+    ridge: ArrayLike,
+    *,
+    fps: float,
+    smoothing_s: float = SMOOTHING_S,
+    tolerance: float = TOLERANCE,
+) -> NDArray[np.float64]:
+    """Weights [T, N] in 0..1 that bring N linear shapes [N, M] closest to targets [T, M].
+
+    Minimises `sum_t |w_t A - b_t|² + sum_k ridge_k w_tk² + sum_k mu_k (w_tk - w_t-1,k)²` over 0 <= w <= 1, with
+    `mu_k = |A_k|² (smoothing_s fps)²`: the time constant is the same at any frame rate and for any shape.
+    Zero targets give zero weights. Memory grows with T. Stops when no weight moves by more than `tolerance`
+    in a sweep.
+    """
+    basis, wanted, price = (np.asarray(value, np.float64) for value in (shapes, targets, ridge))
+    if basis.ndim != 2 or wanted.ndim != 2 or basis.shape[1] != wanted.shape[1] or price.shape != (len(basis),):
+        raise FacesynthError(
+            f"shapes [N, M], targets [T, M] and ridge [N] do not fit: got {basis.shape}, {wanted.shape}, {price.shape}"
+        )
+    if not np.isfinite(wanted).all():
+        raise FacesynthError("targets hold NaN or infinite values; fill the gaps of the motion first")
+    gram = basis @ basis.T
+    stiffness = np.diag(gram) * (smoothing_s * fps) ** 2
+    weights = np.zeros((len(wanted), len(basis)))
+    _descend(gram + np.diag(price), wanted @ basis.T, stiffness, weights, tolerance)
+    return weights
+
+
+def solve_markers(
+    basis: MarkerBasis, frames: ArrayLike, fps: float, known: ArrayLike | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights [T, 52] of marker frames [T, 3K] (mm, head motion removed), and the residual [T] (mm, root mean square).
+
+    known: [T, 52] weights of the shapes that are not solved for (gaze, tongue); zero where not given. Their
+    share of the motion is taken off the markers first.
+    """
+    offsets = np.asarray(frames, np.float64) - basis.rest_mm
+    weights = np.zeros((len(offsets), len(basis.shapes_mm))) if known is None else np.array(known, np.float64)
+    weights[:, basis.free] = 0.0
+    wanted = offsets - weights @ basis.shapes_mm
+    lift = np.concatenate([np.eye(offsets.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
+    weights[:, basis.free] = solve(basis.shapes_mm[basis.free] @ lift, wanted @ lift, basis.ridge[basis.free], fps=fps)
+    weights = follow_gap(basis, weights, offsets)
+    off = (weights @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
+    return weights, np.sqrt((off**2).sum(axis=2).mean(axis=1))
+
+
+def follow_gap(basis: MarkerBasis, weights: NDArray[np.float64], offsets_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights [T, 52] whose lips are as far apart as the markers' where the mouth is nearly shut.
+
+    Least squares spreads its error evenly, and an error of half a millimetre at the lips is a closure lost.
+    The gap is linear in the weights: what is too much is closed by mouthClose, what is too little is opened
+    by less of it and then by more jawOpen. Between 2 and 6 mm the correction fades out.
+    """
+    if not len(basis.gap_rows):
+        return weights
+    slopes = (basis.shapes_mm @ basis.gap_rows.T).mean(axis=1)
+    close, jaw = ARKIT_NAMES.index("mouthClose"), ARKIT_NAMES.index("jawOpen")
+    asked = (offsets_mm @ basis.gap_rows.T).mean(axis=1)
+    nearness = np.clip((6.0 - asked) / 4.0, 0, 1)
+    too_much = (weights @ slopes - asked) * nearness * nearness * (3 - 2 * nearness)
+    corrected = weights.copy()
+    corrected[:, close] = np.clip(weights[:, close] - too_much / slopes[close], 0, 1)
+    left_mm = too_much + (corrected[:, close] - weights[:, close]) * slopes[close]
+    corrected[:, jaw] = np.clip(weights[:, jaw] + np.maximum(-left_mm, 0) / slopes[jaw], 0, 1)
+    return corrected
+
+
+def _gap_rows(pairs: tuple[tuple[int, int], ...], points: int) -> NDArray[np.float64]:
+    rows = np.zeros((len(pairs), 3 * points))
+    for row, (upper, lower) in zip(rows, pairs, strict=True):
+        row[upper * 3 + 1], row[lower * 3 + 1] = 1.0, -1.0
+    return rows
+
+
+# Coordinate descent. With H = A A' + diag(ridge) and the neighbouring frames held, the best value of one weight is
+#   w_tk = clip((b_tk - sum_{j != k} H_kj w_tj + mu_k (w_{t-1,k} + w_{t+1,k})) / (H_kk + n mu_k), 0, 1)
+# with n neighbours (2, or 1 at the ends). Sweeps run forwards and backwards in turn. The problem is strictly convex
+# with a box, so that the sweeps converge to its one minimum; `slope` keeps b_t - H w_t, one frame at a time.
+@njit(cache=True)
+def _descend(H, b, mu, w, tolerance):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    T, N = w.shape
+    slope = np.empty(N)
+    for sweep in range(MAX_SWEEPS):
+        moved = 0.0
+        for step in range(T):
+            t = step if sweep % 2 == 0 else T - 1 - step
+            for k in range(N):
+                slope[k] = b[t, k]
+            for j in range(N):
+                if w[t, j] != 0.0:
+                    for k in range(N):
+                        slope[k] -= H[j, k] * w[t, j]
+            for k in range(N):
+                pull, neighbours = 0.0, 0
+                if t > 0:
+                    pull, neighbours = pull + w[t - 1, k], neighbours + 1
+                if t < T - 1:
+                    pull, neighbours = pull + w[t + 1, k], neighbours + 1
+                old = w[t, k]
+                best = (slope[k] + H[k, k] * old + mu[k] * pull) / (H[k, k] + mu[k] * neighbours)
+                new = min(max(best, 0.0), 1.0)
+                if new != old:
+                    w[t, k] = new
+                    for j in range(N):
+                        slope[j] -= H[k, j] * (new - old)
+                    moved = max(moved, abs(new - old))
+        if moved < tolerance:
+            return

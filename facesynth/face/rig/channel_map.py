@@ -1,0 +1,209 @@
+"""The names of a head of one's own against ARKit's: which channel does what, how strongly, and within which limits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.inference.errors import FacesynthError, unknown
+
+FIELDS = ("from", "gain", "offset", "limit", "mute")
+SECTIONS = ("channels", "head", "mm_per_unit")
+RIDGE = 1e-4
+"""Price of a weight where own channels are turned into ARKit's: it decides only what they leave open."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """How one channel follows the ARKit weights: `clip(gain · Σ share · weight + offset, low, high)`."""
+
+    shares: Mapping[str, float]
+    """ARKit name to its share; empty: the channel follows nothing."""
+    gain: float = 1.0
+    offset: float = 0.0
+    low: float = 0.0
+    high: float = 1.0
+    mute: bool = False
+    """The channel stays at 0."""
+
+
+@dataclass(frozen=True)
+class HeadMapping:
+    """What a mapping file says about a head."""
+
+    channels: Mapping[str, Channel]
+    head: str = ""
+    """Name of the node that turns with the head; empty: one called head, else everything."""
+    mm_per_unit: float | None = None
+    """Size of the file's unit; None: metres in glTF if the face is then as large as a face, else by the face's size."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelMap:
+    """N channels of somebody's own beside the 52 of ARKit."""
+
+    names: tuple[str, ...]
+    channels: tuple[Channel, ...]
+
+    @classmethod
+    def of(cls, names: Sequence[str], given: Mapping[str, Channel] | None = None) -> ChannelMap:
+        """The given channels, and for the others what their names mean where those are ARKit's.
+
+        FacesynthError where a given channel does not exist, or where nothing at all follows ARKit's weights.
+        """
+        given = given or {}
+        for name in given:
+            if name not in names:
+                raise unknown("channel of the mapping", name, names)
+        found = tuple(given.get(name) or _by_name(name) for name in names)
+        if not any(channel.shares for channel in found):
+            raise FacesynthError(
+                f"none of the channels {list(names[:4])} … has an ARKit name such as jawOpen; give a mapping file (--mapping)"
+            )
+        return cls(tuple(names), found)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Channels that follow nothing."""
+        return tuple(name for name, channel in zip(self.names, self.channels, strict=True) if not channel.shares)
+
+    def own(self, weights: ArrayLike) -> NDArray[np.float64]:
+        """[T, N] values of the channels under ARKit weights [T, 52]."""
+        values = np.asarray(weights, np.float64) @ self._mix
+        gain, offset, low, high, live = self._columns
+        return np.clip(values * gain + offset, low, high) * live
+
+    def arkit(self, values: ArrayLike) -> NDArray[np.float64]:
+        """[T, 52] weights 0..1 that come closest to values [T, N] of the channels (bounded least squares).
+
+        Channels that are muted or follow nothing say nothing; of weights that no channel shows the least is taken: 0.
+        """
+        gain, offset, _, _, live = self._columns
+        used = (live > 0) & (np.abs(gain) > 0) & np.array([bool(channel.shares) for channel in self.channels])
+        wanted = np.asarray(values, np.float64)[:, used] - offset[used]
+        basis = self._mix[:, used] * gain[used]
+        weights = wanted @ np.linalg.pinv(basis)
+        beyond = ((weights < 0) | (weights > 1)).any(axis=1)
+        weights[beyond] = _bounded(basis, wanted[beyond])
+        return weights
+
+    @property
+    def _mix(self) -> NDArray[np.float64]:
+        """[52, N] share of each weight in each channel."""
+        mix = np.zeros((len(ARKIT_NAMES), len(self.names)))
+        for column, channel in enumerate(self.channels):
+            for name, share in channel.shares.items():
+                mix[ARKIT_NAMES.index(name), column] = share
+        return mix
+
+    @property
+    def _columns(self) -> NDArray[np.float64]:
+        """[5, N] gain, offset, low, high, and 0 where a channel is mute."""
+        return np.array([[c.gain, c.offset, c.low, c.high, not c.mute] for c in self.channels], np.float64).T
+
+
+def _bounded(basis: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights [T, 52] in 0..1 whose channels `weights @ basis` [52, M] come closest to wanted [T, M]."""
+    from facesynth.face.rig.blendshapes import solve
+
+    weights = np.zeros((len(wanted), len(basis)))
+    seen = np.abs(basis).sum(axis=1) > 0
+    weights[:, seen] = solve(basis[seen], wanted, np.full(int(seen.sum()), RIDGE), fps=1.0, smoothing_s=0.0)
+    return weights
+
+
+def read_mapping(path: str | Path) -> HeadMapping:
+    """Read a mapping file (YAML): own channels under `channels`, and if need be `head` and `mm_per_unit`.
+
+    A channel is an ARKit name, or `{from: NAME or {NAME: share, …}, gain, offset, limit: [low, high], mute}`.
+    """
+    import yaml
+
+    path = Path(path)
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise FacesynthError(f"{path} cannot be read as YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(plain, dict) or not isinstance(plain.get("channels"), dict):
+        raise FacesynthError(f"{path} is no mapping: wanted `channels:` and below it lines such as `Mouth_Open: jawOpen`")
+    for section in plain:
+        if section not in SECTIONS:
+            raise unknown("section of a mapping", str(section), SECTIONS)
+    channels = {str(name): _channel(str(name), value, path) for name, value in plain["channels"].items()}
+    unit = plain.get("mm_per_unit")
+    mm_per_unit = None if unit is None else _number(unit, f"{path}: mm_per_unit")
+    if mm_per_unit is not None and not mm_per_unit > 0:
+        raise FacesynthError(f"{path}: mm_per_unit must be positive, such as 10 for centimetres; got {mm_per_unit:g}")
+    return HeadMapping(channels, str(plain.get("head") or ""), mm_per_unit)
+
+
+def _channel(name: str, value: Any, path: Path) -> Channel:
+    where = f"{path}, channel {name}"
+    if isinstance(value, str):
+        return Channel({_arkit(value): 1.0})
+    if not isinstance(value, dict):
+        raise FacesynthError(f"{where}: wanted an ARKit name, or {{from: …, gain: …}}; got {value!r}")
+    for field in value:
+        if field not in FIELDS:
+            raise unknown(f"field in {where}", str(field), FIELDS)
+    source = value.get("from", {})
+    if not isinstance(source, (str, dict)):
+        raise FacesynthError(f"{where}: `from` is an ARKit name or names with shares; got {source!r}")
+    shares = {source: 1.0} if isinstance(source, str) else source
+    limit = value.get("limit", [0.0, 1.0])
+    if not isinstance(limit, list) or len(limit) != 2:
+        raise FacesynthError(f"{where}: limit is [low, high]; got {limit!r}")
+    low, high = (_number(end, f"{where}, limit") for end in limit)
+    if low > high:
+        raise FacesynthError(f"{where}: the lower limit {low:g} is above the upper one {high:g}")
+    return Channel(
+        {_arkit(str(key)): _number(share, f"{where}, share of {key}") for key, share in shares.items()},
+        _number(value.get("gain", 1.0), f"{where}, gain"),
+        _number(value.get("offset", 0.0), f"{where}, offset"),
+        low,
+        high,
+        bool(value.get("mute", False)),
+    )
+
+
+def _arkit(name: str) -> str:
+    found = arkit_name(name)
+    if found is None:
+        raise unknown("ARKit name", name, ARKIT_NAMES)
+    return found
+
+
+def _number(value: Any, what: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not np.isfinite(number):
+        raise FacesynthError(f"{what} must be a number; got {value!r}")
+    return number
+
+
+def arkit_name(name: str) -> str | None:
+    """The ARKit name that a name means, whatever its case, with `_L` or `_R` for the sides and a prefix before a dot."""
+    last = name.rpartition(".")[2]
+    plain = re.sub(r"[_ -](l|r)$", lambda side: {"l": "left", "r": "right"}[side[1].lower()], last, flags=re.IGNORECASE)
+    return _FOLDED.get(re.sub(r"[_ -]", "", plain).lower())
+
+
+def _by_name(name: str) -> Channel:
+    found = arkit_name(name)
+    return Channel({found: 1.0} if found else {})
+
+
+def _folded(names: Iterable[str]) -> dict[str, str]:
+    return {name.lower(): name for name in names}
+
+
+_FOLDED = _folded(ARKIT_NAMES)

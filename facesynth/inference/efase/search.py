@@ -1,0 +1,273 @@
+"""The cheapest path, exactly, looking at few of the nodes.
+
+phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j). Three passes find the best path to the newest phone:
+
+* as phones come, a lower bound of phi is kept for every node (`StepBounds.forward`), and beside it a beam: a few nodes
+  whose paths are real ones, so that their costs are upper bounds;
+* backwards, the least that is still to come bounds what a path through a node costs in all; nodes for which that exceeds
+  the beam's best path are left out, which are nearly all;
+* forwards again, phi is computed exactly for the nodes that are left. Predecessors are sorted by phi + the cost of the
+  joint, by matrix products; the costly bending is computed from the front until nothing better can follow.
+
+What was computed once is kept: when a phone is added, only nodes that were left out before may have to be looked at.
+`settle` fixes a node and forgets what lies before it, so that an input without an end costs the same at every phone.
+Bounds are compared with a margin for rounding; ties go to the node of the lowest number. numpy pays for each call: all is
+in batches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..efase.bounds import StepBounds
+from ..efase.nodes import Floats, Ints, Nodes, Query
+from ..products import product
+
+BEAM = 32
+"""Nodes with real paths that are kept at each phone."""
+TRIED = 2
+"""Predecessors of each node that the beam tries, the nearest ones."""
+CHUNK = 6
+"""Predecessors of each node whose bending is computed at once."""
+ROUNDING = 1e-9
+"""By which squared distances from matrix products are lowered, relative to the vectors."""
+MARGIN = 1e-5
+"""Of upper bounds: tables and bounds are in single precision."""
+MANY = 300
+"""Nodes a phone, on average, for which a better upper bound is worth looking for."""
+UNKNOWN, START = -2, -1
+"""In place of a predecessor."""
+
+
+@dataclass(eq=False)
+class Position:
+    """What is known at one phone."""
+
+    query: Query
+    targets: Floats
+    """[C] target cost of the nodes of each class, what is heard left out."""
+    phi: Floats
+    """[N] exact where `back` is known, elsewhere a lower bound."""
+    back: NDArray[np.int32]
+    """[N] best predecessor."""
+    beam: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    upper: Floats = field(default_factory=lambda: np.zeros(0))
+    """[K] cost of a path to each node of the beam."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Nodes that may be on the best path."""
+
+    nodes: Ints
+    unknown: NDArray[np.bool_]
+    """[n] whose phi must be computed."""
+    rest: Floats
+    """[n] what a path costs at least after the node."""
+
+
+class Search:
+    """`push` phones; `path` is the best so far."""
+
+    def __init__(self, nodes: Nodes, bounds: StepBounds) -> None:
+        self.nodes, self.bounds = nodes, bounds
+        self.positions: list[Position] = []
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def push(self, query: Query) -> None:
+        """The next phone."""
+        nodes = self.nodes
+        targets, back = nodes.class_targets(query), np.full(len(nodes), UNKNOWN, np.int32)
+        phi = targets[nodes.class_of]
+        if query.heard is not None:
+            phi += query.heard
+        if query.node >= 0:
+            phi = np.where(np.arange(len(nodes)) == query.node, phi, np.inf)
+        if self.positions:
+            phi += self.bounds.forward(self.positions[-1].phi)
+        else:
+            back[:] = START
+        here = Position(query, targets, phi, back)
+        here.beam, here.upper = self._beam(here)
+        self.positions.append(here)
+
+    def path(self) -> Ints:
+        """[T] the nodes of the cheapest path to the newest phone."""
+        return self.trace(len(self))
+
+    def trace(self, count: int) -> Ints:
+        """[count] the last nodes of that path."""
+        self._solve()
+        last = self.positions[-1]
+        node, found = self._first_of_least(np.where(last.back == UNKNOWN, np.inf, last.phi), np.arange(len(self.nodes))), []
+        for position in self.positions[: -count - 1 : -1]:
+            found.append(node)
+            node = int(position.back[node])
+        return np.array(found[::-1], np.int64)
+
+    def _first_of_least(self, cost: Floats, which: Ints) -> int:
+        """Of the nodes `which` [n] that of least cost [n]; of those, the one of the lowest number."""
+        tied = which[cost == cost.min()]
+        return int(tied[self.nodes.numbers[tied].argmin()])
+
+    def settle(self, node: int, ahead: int) -> None:
+        """From now on all paths go through `node`, of the last path `trace`, `ahead` phones before the newest one.
+
+        What lies before that is forgotten, and costs count from there. Bounds stay bounds, since fewer paths are left;
+        what is exact stays so where its path goes through the node.
+        """
+        del self.positions[: -ahead - 1]
+        first = self.positions[0]
+        cost = float(first.phi[node])
+        first.phi, first.back = np.full(len(self.nodes), np.inf), np.full(len(self.nodes), UNKNOWN, np.int32)
+        first.phi[node], first.back[node] = 0.0, START
+        first.beam, first.upper = np.array([node]), np.zeros(1)
+        for before, here in pairwise(self.positions):
+            here.phi -= cost
+            known = np.flatnonzero(here.back != UNKNOWN)
+            here.back[known[before.back[here.back[known]] == UNKNOWN]] = UNKNOWN
+        newest = self.positions[-1]
+        known = np.flatnonzero(newest.back != UNKNOWN)
+        newest.beam = known[np.argsort(newest.phi[known], kind="stable")[:BEAM]]
+        newest.upper = newest.phi[newest.beam]
+
+    def _target(self, position: Position, which: Ints) -> Floats:
+        """[n] target cost of the nodes `which`."""
+        cost: Floats = position.targets[self.nodes.class_of[which]]
+        return cost if position.query.heard is None else cost + position.query.heard[which]
+
+    def _beam(self, here: Position) -> tuple[Ints, Floats]:
+        """Real paths to nodes of small bounds and to those that were recorded after the last beam."""
+        phi, wide = here.phi, min(BEAM, len(here.phi))
+        chosen = np.argpartition(phi, wide - 1)[:wide]
+        if not self.positions:
+            return chosen, phi[chosen]
+        last = self.positions[-1]
+        chosen = np.union1d(chosen, self.bounds.following(last.beam))
+        chosen = chosen[phi[chosen] < np.inf]
+        upper = self._reached(last.beam, last.upper, chosen) + self._target(here, chosen)
+        best = np.argsort(upper, kind="stable")[:BEAM]
+        return chosen[best], upper[best]
+
+    def _reached(self, i: Ints, phi: Floats, j: Ints) -> Floats:
+        """[m] costs of paths to the nodes j, each through one of the predecessors that look best."""
+        nodes = self.nodes
+        costs = phi + self._joints(i, j)
+        wide = min(TRIED, len(i))
+        tried = np.argpartition(costs, wide - 1, axis=1)[:, :wide]
+        steps = nodes.steps(i[tried].ravel(), np.repeat(j, wide)).reshape(tried.shape)
+        best = (phi[tried] + steps).min(axis=1)
+        place = np.full(len(nodes) + 1, -1)
+        place[i] = np.arange(len(i))
+        captured = place[nodes.before[j]]
+        return np.minimum(best, np.where(captured >= 0, phi[captured], np.inf))
+
+    def _joints(self, i: Ints, j: Ints) -> Floats:
+        """[m, n] cost of the joint from each i to each j, rounded down, and of another viseme class."""
+        nodes = self.nodes
+        ends, joints = nodes.ends(i), nodes.joints(j)
+        total = np.square(joints).sum(axis=1)[:, None] + np.square(ends).sum(axis=1)
+        cost = np.maximum(total * (1 - ROUNDING) - 2 * product(joints, ends.T), 0.0)
+        cost += np.where(nodes.visemes[nodes.before[j]][:, None] == nodes.visemes[i], 0.0, nodes.weights.pnt)
+        return cost
+
+    def _solve(self) -> None:
+        """Make phi known for every node at the newest phone that may be its best, and for all on the way there."""
+        limit = _limit(self.positions[-1].upper)
+        kept = self._backwards(limit)
+        if sum(len(some.nodes) for some in kept) > MANY * len(kept):
+            limit = min(limit, _limit(self._led(kept)))
+            kept = self._backwards(limit)
+        for t in range(len(self) - len(kept) + 1, len(self)):
+            self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
+
+    def _led(self, kept: list[Kept]) -> Floats:
+        """Costs of paths to the newest phone, found by a beam that knows both bounds: where the first beam went astray."""
+        i, phi = kept[0].nodes, self.positions[-len(kept)].phi[kept[0].nodes]
+        for position, some in zip(self.positions[1 - len(kept) :] if len(kept) > 1 else [], kept[1:], strict=True):
+            whole = position.phi[some.nodes] + some.rest
+            j = some.nodes[np.argsort(whole, kind="stable")[: 2 * BEAM]]
+            j = np.union1d(j, np.intersect1d(self.bounds.following(i), some.nodes))
+            phi = self._reached(i, phi, j) + self._target(position, j)
+            best = np.argsort(phi, kind="stable")[: 2 * BEAM]
+            i, phi = j[best], phi[best]
+        return phi
+
+    def _backwards(self, limit: float) -> list[Kept]:
+        """Nodes of the last positions, in the order of time, until all of them are known."""
+        last = self.positions[-1]
+        nodes = np.flatnonzero(last.phi <= limit)
+        found = [Kept(nodes, last.back[nodes] == UNKNOWN, np.zeros(len(nodes)))]
+        for position, after in zip(self.positions[-2::-1], self.positions[:0:-1], strict=True):
+            j = found[-1].nodes[found[-1].unknown]
+            if not len(j):
+                break
+            value = found[-1].rest[found[-1].unknown] + self._target(after, j)
+            i = np.flatnonzero(position.phi <= limit - value.min())
+            rest = self.bounds.backward(j, value, i)
+            left = position.phi[i] + rest <= limit
+            found.append(Kept(i[left], position.back[i[left]] == UNKNOWN, rest[left]))
+        return found[::-1]
+
+    def _forwards(self, t: int, i: Ints, kept: Kept, limit: float) -> None:
+        """phi of the nodes that are not known at position t, from the nodes i before it."""
+        last, here = self.positions[t - 1], self.positions[t]
+        i = i[last.back[i] != UNKNOWN]
+        j, rest = kept.nodes[kept.unknown], kept.rest[kept.unknown]
+        if not len(j) or not len(i):
+            here.phi[j] = np.maximum(here.phi[j], limit - rest)
+            return
+        target = self._target(here, j)
+        best, origin = self._cheapest(i, last.phi[i], j, limit - rest - target)
+        phi, exact = best + target, best + target + rest <= limit
+        here.phi[j] = np.where(exact, phi, np.maximum(here.phi[j], limit - rest))
+        here.back[j[exact]] = origin[exact]
+
+    def _cheapest(self, i: Ints, phi: Floats, j: Ints, limit: Floats) -> tuple[Floats, Ints]:
+        """[m] least phi(i) + TC(i, j), and where from; only what is within the limits [m] is looked for."""
+        nodes, captured = self.nodes, self.nodes.before[j]
+        place = np.full(len(nodes) + 1, -1)
+        place[i] = np.arange(len(i))
+        before = place[captured]
+        best, origin = np.where(before >= 0, phi[before], np.inf), captured.copy()
+        orphan = captured < 0
+        best[orphan], origin[orphan] = phi.min() + nodes.weights.alpha * nodes.weights.pnt, self._first_of_least(phi, i)
+        lowest = phi + self._joints(i, j)
+        lowest[orphan] = np.inf
+        lowest[np.flatnonzero(before >= 0), before[before >= 0]] = np.inf
+        rows = np.arange(len(j))
+        self._try(rows, lowest.argmin(axis=1), lowest, i, phi, j, best, origin)
+        while True:
+            row, column = np.nonzero(lowest <= np.minimum(best, limit)[:, None])
+            if not len(row):
+                return best, origin
+            order = np.lexsort((lowest[row, column], row))
+            row, column = row[order], column[order]
+            rank = np.arange(len(row)) - np.searchsorted(row, row)
+            now = rank < CHUNK
+            self._try(row[now], column[now], lowest, i, phi, j, best, origin)
+
+    def _try(self, row: Ints, column: Ints, lowest: Floats, i: Ints, phi: Floats, j: Ints, best: Floats, origin: Ints) -> None:
+        """Compute the pairs (i[column], j[row]) exactly, and take them off `lowest`."""
+        numbers, usable = self.nodes.numbers, lowest[row, column] < np.inf
+        row, column = row[usable], column[usable]
+        cost = phi[column] + self.nodes.steps(i[column], j[row])
+        lowest[row, column] = np.inf
+        order = np.lexsort((numbers[i[column]], cost, row))
+        row, column, cost = row[order], column[order], cost[order]
+        ahead = np.concatenate([[True], row[1:] != row[:-1]])[: len(row)]
+        row, node, cost = row[ahead], i[column[ahead]], cost[ahead]
+        better = (cost < best[row]) | ((cost == best[row]) & (numbers[node] < numbers[origin[row]]))
+        best[row[better]], origin[row[better]] = cost[better], node[better]
+
+
+def _limit(upper: Floats) -> float:
+    """The least of upper bounds, with a margin."""
+    least = float(upper.min())
+    return least + MARGIN * max(abs(least), 1e-3)

@@ -1,0 +1,161 @@
+"""An exported folder: nothing in it is used before its hash is found right."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import struct
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FacesynthError
+
+FORMAT = 2
+MANIFEST = "manifest.json"
+MOST_BYTES = 1 << 24
+"""Of a manifest: a larger one is none."""
+ARRAYS = "arrays.npz"
+MOST_HEADER = 1 << 16
+"""Of an array in a file, bytes."""
+OPSETS = (20,)
+"""Of the graphs."""
+KEYS = (
+    "format", "method", "opset", "files", "graphs", "arrays", "layout", "fps", "sample_rate", "settings", "latency", "emotions",
+    "phones", "training_data", "sha256",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Folder:
+    """A verified folder."""
+
+    path: Path
+    manifest: dict[str, Any]
+    contents: dict[str, bytes]
+    """Of every file, as it was when its hash was found right: nothing is read a second time."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the method needs beside graphs and arrays."""
+        settings: dict[str, Any] = self.manifest["settings"]
+        return settings
+
+    def bytes_of(self, name: str) -> bytes:
+        """A file's content; FacesynthError where the manifest does not list it."""
+        if name not in self.contents:
+            raise FacesynthError(f"{self.path / name} is not listed in the manifest; export the model again")
+        return self.contents[name]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All arrays, with the types and shapes that the manifest states; they cannot be written to."""
+        path, content = self.path / ARRAYS, self.bytes_of(ARRAYS)
+        try:
+            found = _members(content, list(self.manifest["arrays"]))
+        except (zipfile.BadZipFile, ValueError, KeyError) as error:
+            raise FacesynthError(f"{path}: cannot be read ({error}); export the model again") from None
+        for name, wanted in self.manifest["arrays"].items():
+            got = found[name]
+            if list(got.shape) != wanted["shape"] or str(got.dtype) != wanted["dtype"]:
+                raise FacesynthError(
+                    f"{path}: {name} is {got.dtype} {list(got.shape)}; the manifest wants {wanted['dtype']} {wanted['shape']}"
+                )
+        return found
+
+
+@contextmanager
+def stated_by_manifest(folder: Path) -> Iterator[None]:
+    """Whoever may write a manifest may leave things out of it: what is missing or odd is named in place of a traceback."""
+    try:
+        yield
+    except FacesynthError:
+        raise
+    except (KeyError, IndexError) as error:
+        raise FacesynthError(f"{folder / MANIFEST} lacks {error}; export the model again") from None
+    except (TypeError, AttributeError, ValueError, OverflowError) as error:
+        raise FacesynthError(f"{folder / MANIFEST} states what cannot be ({error}); export the model again") from None
+    except RecursionError:
+        raise FacesynthError(f"{folder / MANIFEST} is nested too deeply for a manifest; export the model again") from None
+
+
+def open_folder(path: str | Path) -> Folder:
+    """Read the manifest and compare the hash of every file with it; FacesynthError names the file that is wrong."""
+    folder, contents = Path(path), {}
+    with stated_by_manifest(folder):
+        manifest = _manifest(folder / MANIFEST)
+        for name, wanted in manifest["files"].items():
+            if Path(name).name != name:
+                raise FacesynthError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
+            contents[name] = checked_bytes(folder / name, wanted)
+    return Folder(folder, manifest, contents)
+
+
+def _members(content: bytes, names: list[str]) -> dict[str, NDArray[Any]]:
+    """Arrays of an uncompressed npz as views of its bytes, whose hash is known: nothing is copied or summed up again."""
+    found = {}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for name in names:
+            entry = archive.getinfo(f"{name}.npy")
+            if entry.compress_type != zipfile.ZIP_STORED:
+                raise ValueError(f"{name} is compressed")
+            name_bytes, extra_bytes = struct.unpack_from("<HH", content, entry.header_offset + 26)
+            start = entry.header_offset + 30 + name_bytes + extra_bytes
+            member = io.BytesIO(content[start : start + min(entry.file_size, MOST_HEADER)])
+            version = np.lib.format.read_magic(member)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, in_columns, dtype = read(member)
+            if dtype.hasobject:
+                raise ValueError(f"{name} holds objects")
+            count = int(np.prod(shape, dtype=np.int64))
+            flat = np.frombuffer(content, dtype, count, start + member.tell())
+            found[name] = flat.reshape(shape, order="F" if in_columns else "C")
+    return found
+
+
+def checked_bytes(path: Path, wanted: Any) -> bytes:
+    """The content of a file whose size and sha256 are as wanted."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise FacesynthError(f"{path}: {error.strerror or 'cannot be read'}; copy the whole folder, or export it again") from None
+    if len(content) != wanted["bytes"]:
+        raise FacesynthError(f"{path} has {len(content)} bytes; wanted {wanted['bytes']}: it is truncated or of another export")
+    if hashlib.sha256(content).hexdigest() != wanted["sha256"]:
+        raise FacesynthError(f"{path} does not have the hash that the manifest states: it was changed or is of another export")
+    return content
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise FacesynthError(f"{path} is too large for a manifest")
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FacesynthError(f"{path}: no such file; wanted a folder written by `facesynth export`") from None
+    except (OSError, ValueError) as error:
+        raise FacesynthError(f"{path} is damaged or no manifest ({error}); export the model again") from None
+    if not isinstance(manifest, dict) or manifest.get("written_by") != "facesynth":
+        raise FacesynthError(f"{path} was not written by `facesynth export`")
+    if lacking := [key for key in KEYS if key not in manifest]:
+        raise FacesynthError(f"{path} lacks {', '.join(lacking)}; export the model again")
+    if manifest["format"] != FORMAT:
+        raise FacesynthError(f"{path} has format {manifest['format']}; this runtime reads {FORMAT}: export the model again")
+    if manifest["opset"] not in OPSETS:
+        raise FacesynthError(
+            f"{path} states opset {manifest['opset']}; this runtime knows {OPSETS[0]}: export it again, or take a newer one"
+        )
+    if _digest(manifest) != manifest["sha256"]:
+        raise FacesynthError(f"{path} was changed after it was written; export the model again")
+    return manifest
+
+
+def _digest(manifest: dict[str, Any]) -> str:
+    plain = {key: value for key, value in manifest.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

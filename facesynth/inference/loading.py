@@ -1,0 +1,35 @@
+"""From a folder to a model."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from .errors import FacesynthError, unknown
+from .folder import open_folder, stated_by_manifest
+
+_MODELS = {
+    "lds": ".lds:Lds",
+    "emotion": ".emotion:EmotionDetector",
+    "efase": ".efase:Efase",
+    "anime_graph": ".anime_graph:AnimeGraph",
+    "graphs": ".parts:Parts",
+}
+
+
+def load(folder: str | Path, *, threads: int = 1) -> Any:
+    """The model in an exported folder, every file of which is verified; it is called like the torch model it came from.
+
+    threads: of each onnxruntime session.
+    """
+    if not isinstance(threads, int) or threads < 1:
+        raise FacesynthError(f"threads is {threads!r}; wanted 1 or more")
+    opened = open_folder(folder)
+    method = opened.manifest["method"]
+    if not isinstance(method, str) or method not in _MODELS:
+        raise unknown(f"method in {opened.path / 'manifest.json'}", str(method), _MODELS)
+    module, _, name = _MODELS[method].partition(":")
+    model = getattr(importlib.import_module(module, __package__), name)
+    with stated_by_manifest(opened.path):
+        return model(opened, threads)

@@ -1,0 +1,109 @@
+"""Sound at another rate."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import gcd
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .checks import checked_piece, require_open
+from .errors import FacesynthError
+
+BLOCK = 8192
+"""Output samples computed at once."""
+KAISER_BETA = 5.0
+REACH = 10
+"""Half length of the filter in periods of the lower rate."""
+
+
+def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float32]:
+    """The same sound [S] at another rate in Hz, band-limited: a polyphase filter of 20 periods of the lower rate."""
+    rate, new_rate, audio = checked_hz(rate), checked_hz(new_rate), checked_piece(audio)
+    if rate == new_rate:
+        return audio
+    return _resampled(audio, 0, 0, -(-len(audio) * new_rate // rate), rate, new_rate)
+
+
+class Resampler:
+    """The same for sound in pieces: what `push` and `finish` give is, put together, `resample` of the whole."""
+
+    def __init__(self, rate: int, new_rate: int) -> None:
+        self.rate, self.new_rate = checked_hz(rate), checked_hz(new_rate)
+        self._heard = np.zeros(0, np.float32)
+        self._first = self._given = 0
+        """Which sample `heard` begins with; how many samples were given out."""
+        self._ended = False
+
+    @property
+    def look_ahead_s(self) -> float:
+        """A sample is given out when the sound up to this after it is known, seconds."""
+        return 0.0 if self.rate == self.new_rate else 10 / min(self.rate, self.new_rate)
+
+    def push(self, audio: ArrayLike) -> NDArray[np.float32]:
+        """More sound [S]; the samples [S'] that became final."""
+        require_open(self._ended)
+        piece = checked_piece(audio)
+        if self.rate == self.new_rate:
+            return piece
+        self._heard = np.concatenate([self._heard, piece])
+        common = gcd(self.rate, self.new_rate)
+        up, down = self.new_rate // common, self.rate // common
+        known = (self._first + len(self._heard) - 1) * up - REACH * max(up, down)
+        return self._give(max(self._given, known // down))
+
+    def finish(self) -> NDArray[np.float32]:
+        """The samples that were held back: after the end there is silence."""
+        require_open(self._ended)
+        self._ended = True
+        return self._give(-(-(self._first + len(self._heard)) * self.new_rate // self.rate))
+
+    def _give(self, stop: int) -> NDArray[np.float32]:
+        given = _resampled(self._heard, self._first, self._given, stop, self.rate, self.new_rate)
+        self._given = max(self._given, stop)
+        common = gcd(self.rate, self.new_rate)
+        up, down = self.new_rate // common, self.rate // common
+        needed = (self._given * down - REACH * max(up, down)) // up - 1
+        kept = min(max(0, needed - self._first), len(self._heard))
+        self._heard, self._first = self._heard[kept:], self._first + kept
+        return given
+
+
+def _resampled(audio: NDArray[Any], first: int, start: int, stop: int, rate: int, new_rate: int) -> NDArray[np.float32]:
+    """Output samples start..stop of a sound whose samples from `first` on are given; around them there is silence."""
+    common = gcd(rate, new_rate)
+    up, down = new_rate // common, rate // common
+    table, reach = _phases(up, down)
+    each = table.shape[1]
+    padded = np.pad(np.asarray(audio, np.float64), (each, each))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, each)
+    out = np.empty(max(0, stop - start), np.float32)
+    for at in range(start, stop, BLOCK):
+        k = np.arange(at, min(at + BLOCK, stop), dtype=np.int64)
+        begins = -(-(k * down - reach) // up)
+        phase = begins * up - (k * down - reach)
+        out[k - start] = np.einsum("kn,kn->k", table[phase], windows[np.clip(begins - first + each, 0, len(windows) - 1)])
+    return out
+
+
+def checked_hz(rate: Any) -> int:
+    """A rate of sound."""
+    if not isinstance(rate, int | float | np.number) or not (np.isfinite(rate) and rate > 0 and int(rate) == rate):
+        raise FacesynthError(f"the sound has a rate of {rate} Hz; wanted a whole, positive number")
+    return int(rate)
+
+
+@lru_cache(maxsize=8)
+def _phases(up: int, down: int) -> tuple[NDArray[np.float64], int]:
+    """[up, n] taps that the n input samples around an output sample are weighted with, by where it lies between them.
+
+    Taken from a Kaiser-windowed sinc of gain `up`, whose half length, counted at the common rate, comes beside them.
+    """
+    slower = max(up, down)
+    reach = REACH * slower
+    taps = np.sinc(np.arange(-reach, reach + 1) / slower) * np.kaiser(2 * reach + 1, KAISER_BETA)
+    taps *= up / taps.sum()
+    places = 2 * reach - np.arange(up)[:, None] - up * np.arange(2 * reach // up + 2)
+    return np.where(places >= 0, taps[np.maximum(places, 0)], 0.0), reach

@@ -1,0 +1,1 @@
+"""From speech and a method to a face that one can watch."""
