@@ -17,6 +17,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
 from facesynth.methods.anime_graph.report import MapTrial
+from facesynth.methods.training import train
 
 
 def main() -> None:
@@ -35,7 +36,7 @@ def main() -> None:
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = AnimeGraph.from_config(settings).fit(learn, seed=options.seed)
+    model = train(AnimeGraph, learn, settings, seed=options.seed)
     if told := model.facts.get("learned"):
         print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
         print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))

@@ -15,6 +15,7 @@ from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, marker_error
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.training import train
 
 
 def main() -> None:
@@ -32,7 +33,7 @@ def main() -> None:
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = Efase.from_config(settings).fit(recorded, seed=options.seed)
+    model = train(Efase, recorded, settings, seed=options.seed)
     if told := model.facts.get("learned"):
         print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
         print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))

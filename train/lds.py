@@ -16,6 +16,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
+from facesynth.methods.training import train as learn
 from facesynth.stage.likeness import save_face
 
 CONFIG = Path(__file__).parents[1] / "configs" / "lds.yaml"
@@ -30,7 +31,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit. The order and the lead are chosen on the training sentences alone.
-    model = LDS.from_config(load_config(options.config)).fit(train, seed=options.seed)
+    model = learn(LDS, train, load_config(options.config), seed=options.seed)
     report(model)
 
     # Evaluate: the deterministic part, samples with noise, and the mean pose of the training sentences.

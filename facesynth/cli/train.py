@@ -50,7 +50,8 @@ def train(
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
-    from facesynth.methods.registry import create
+    from facesynth.methods.registry import method_class
+    from facesynth.methods.training import train as learn
     from facesynth.stage.likeness import save_face
 
     chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
@@ -61,13 +62,14 @@ def train(
         train_detector(corpus, chosen, output or Path("emotion.safetensors"), part, workers=Workers(**who), as_json=as_json)
         return
     _require_alone(method, Workers(**who))
-    model = create(method, **chosen)
+    wanted = method_class(method)
+    wanted.from_config(chosen)
     recordings = Corpus.open(corpus)
     _require_speech(recordings)
     if split == "train":
         recordings, _ = recordings.split(seed)
     start = time.perf_counter()
-    model.fit(recordings, seed=seed)
+    model = learn(wanted, recordings, chosen, seed=seed)
     seconds = time.perf_counter() - start
     path = output or Path(f"{method}.safetensors")
     model.save(path)

@@ -11,9 +11,11 @@ from typing import Any
 import yaml
 
 from facesynth.config import load_config
+from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
 from facesynth.methods.registry import create, method_class
+from facesynth.methods.training import train
 
 SECOND_TAKE = "second take"
 """The label of the row that is a recording."""
@@ -45,6 +47,10 @@ class Contestant:
     def create(self) -> Method:
         """The method, untrained; unknown settings are answered with the nearest known one."""
         return create(self.method, **self.settings)
+
+    def train(self, corpus: Corpus, seed: int) -> Method:
+        """The method, trained."""
+        return train(method_class(self.method), corpus, self.settings, seed=seed)
 
     def plain(self) -> dict[str, Any]:
         """Everything that decides what it makes, as JSON values; settings left out are the method's defaults."""

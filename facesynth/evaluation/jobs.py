@@ -123,9 +123,8 @@ def _run(job: Job, corpus: Corpus) -> None:
 def _train(job: Job, corpus: Corpus) -> dict[str, Any]:
     learned = job.learned(corpus)
     _warm_up(job, corpus.subset(learned[:WARM_UTTERANCES]))
-    method = job.contestant.create()
     with stopwatch() as spent:
-        method.fit(corpus.subset(learned), seed=job.seed)
+        method = job.contestant.train(corpus.subset(learned), job.seed)
     method.save(job.model)
     return {
         "train_s": spent.clock_s,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from errno import EIO
 from pathlib import Path
 from typing import Any, ClassVar, Self, get_type_hints
@@ -29,18 +30,37 @@ _FITTING: dict[type, tuple[type, ...]] = {float: (float, int), int: (int,), bool
 _HEADER = ("method", "config", "layout", "fps", "emotions", "facts", "provenance")
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """What was learned before `fit`."""
+
+    config: Mapping[str, Any]
+    """The config to fit with."""
+    account: Mapping[str, Any] = field(default_factory=dict)
+    """What the trained model remembers of it, as JSON can hold it; empty where nothing was learned."""
+
+
 class Method(nn.Module):
     """Base of all methods: config in, `fit`, `synthesize`, one safetensors file on disk.
 
-    A subclass takes its config as keyword arguments of `__init__`, keeps learned arrays in buffers
+    A subclass takes its config as arguments of `__init__`, keeps learned arrays in buffers
     and everything else that it learned in `facts`, a dictionary that JSON can hold.
     """
 
     name: ClassVar[str]
+    config: dict[str, Any]
+    """Every argument of the constructor, those left out at their defaults."""
 
-    def __init__(self, **config: Any) -> None:
+    def __new__(cls, *args: Any, **config: Any) -> Self:
+        """Keep the constructor's arguments as the config, so that no method repeats their names."""
+        method = super().__new__(cls)
+        given = inspect.signature(cls.__init__).bind_partial(method, *args, **config)
+        given.apply_defaults()
+        method.config = dict(list(given.arguments.items())[1:])
+        return method
+
+    def __init__(self) -> None:
         super().__init__()
-        self.config: dict[str, Any] = config
         self.layout: Layout | None = None
         self.fps: float = 0.0
         self.emotions: tuple[str, ...] = ()
@@ -60,8 +80,21 @@ class Method(nn.Module):
                 raise FacesynthError(f"{cls.name} setting {key} must be a {kind.__name__}; got {value!r}")
         return cls(**config)
 
+    @classmethod
+    def prepared(cls, config: Mapping[str, Any], corpus: Corpus, seed: int) -> Prepared:
+        """Learn, before `fit`, what config to fit with; here the one given.
+
+        A method that learns numbers of its own config overrides this: it may train what it likes on parts of the corpus.
+        """
+        return Prepared(config)
+
+    def remember(self, account: Mapping[str, Any]) -> None:
+        """Keep, after `fit`, the account of `prepared`; an override may also put it to use."""
+        if account:
+            self.facts["learned"] = dict(account)
+
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
-        """Learn from a corpus; returns self."""
+        """Learn from a corpus; returns self. It takes the config as it is; `facesynth.methods.training.train` prepares it."""
         raise NotImplementedError
 
     def synthesize(self, speech: Speech, *, seed: int = 0) -> Motion:

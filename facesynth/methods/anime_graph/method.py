@@ -106,22 +106,7 @@ class AnimeGraph(Method):
         sharpening: float = 0.0,
         learn: bool = False,
     ) -> None:
-        super().__init__(
-            variance=variance,
-            parameters=parameters,
-            jump_weight=jump_weight,
-            jump_cost_weight=jump_cost_weight,
-            audio_weight=audio_weight,
-            map_width=map_width,
-            map_kernel=map_kernel,
-            map_centres=map_centres,
-            emotional_components=emotional_components,
-            help_pairs=help_pairs,
-            temperature=temperature,
-            pose_weight=pose_weight,
-            sharpening=sharpening,
-            learn=learn,
-        )
+        super().__init__()
         for name, value in (("temperature", temperature), ("pose_weight", pose_weight), ("sharpening", sharpening)):
             if not 0 <= value < float("inf"):
                 raise FacesynthError(f"{name} must be 0 (as in the paper) or above; got {value}")

@@ -43,7 +43,7 @@ class Ridge(Method):
     """[D]"""
 
     def __init__(self, components: int = 25) -> None:
-        super().__init__(components=components)
+        super().__init__()
         self.components = components
         self.hearing = Hearing()
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))

@@ -53,7 +53,7 @@ class Tcn(Method):
     """[1] standard deviation of the first component, unit of the layout."""
 
     def __init__(self, components: int = 25, steps: int = 600) -> None:
-        super().__init__(components=components, steps=steps)
+        super().__init__()
         self.components, self.steps = components, steps
         self.hearing = Hearing()
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))

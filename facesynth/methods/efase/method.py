@@ -94,7 +94,7 @@ class Efase(Method):
         sharpening: float = 0.0,
         learn: bool = False,
     ) -> None:
-        super().__init__(**{k: v for k, v in locals().items() if k not in ("self", "__class__")})
+        super().__init__()
         lowest = min(temperature, audio_weight, pose_weight, sharpening)
         if lowest < 0 or candidates < 1:
             raise FacesynthError(

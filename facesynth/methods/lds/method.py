@@ -67,16 +67,7 @@ class LDS(Method):
         stochastic_order: int | Auto = "auto",
         own_means: bool = True,
     ) -> None:
-        super().__init__(
-            scale=scale,
-            features=features,
-            lead_ms=lead_ms,
-            components=components,
-            rows=rows,
-            deterministic_order=deterministic_order,
-            stochastic_order=stochastic_order,
-            own_means=own_means,
-        )
+        super().__init__()
         _check(self.config)
         self.features, self.shape = Standardised.empty(), Standardised.empty()
         self.rollout, self.innovations = Rollout.empty(), Innovations.empty()
