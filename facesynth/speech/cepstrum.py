@@ -1,4 +1,4 @@
-"""The real cepstrum of a whole sound."""
+"""The real cepstrum of a whole sound; torchaudio has cepstra of mel bands only."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torchaudio.functional import melscale_fbanks, spectrogram
 
 FLOOR = 1e-8
 """Band energy that counts as nothing, so that digital silence has a logarithm (-18.4)."""
@@ -34,7 +35,7 @@ class LogMel(nn.Module):
         self.bands, self.sample_rate, self.hop = bands, sample_rate, round(hop_s * sample_rate)
         length = round(window_s * sample_rate)
         self.fft = 1 << (length - 1).bit_length()
-        filters = torch.from_numpy(mel_filters(bands, self.fft, sample_rate))
+        filters = melscale_fbanks(self.fft // 2 + 1, 0.0, sample_rate / 2, bands, sample_rate)
         self.register_buffer("window", torch.hann_window(length), persistent=False)
         self.register_buffer("filters", filters, persistent=False)
 
@@ -45,28 +46,18 @@ class LogMel(nn.Module):
 
     def forward(self, audio: Tensor) -> Tensor:
         """Audio [..., S] at `sample_rate` to log energies [..., 1 + S // hop, bands]."""
-        spectrum = torch.stft(
-            audio.reshape(-1, audio.shape[-1]),
-            self.fft,
-            self.hop,
-            len(self.window),
-            self.window,
+        power = spectrogram(
+            audio,
+            pad=0,
+            window=self.window,
+            n_fft=self.fft,
+            hop_length=self.hop,
+            win_length=len(self.window),
+            power=2.0,
+            normalized="window",
             pad_mode="constant",
-            return_complex=True,
-        )
-        power = spectrum.abs().square().transpose(1, 2) / self.window.square().sum()  # [B, F, fft // 2 + 1]
-        energies = torch.log(power @ self.filters + FLOOR)
-        return energies.reshape(*audio.shape[:-1], *energies.shape[1:])
-
-
-def mel_filters(bands: int, fft: int, sample_rate: int) -> NDArray[np.float32]:
-    """[fft // 2 + 1, bands] triangles over the bins of an FFT; each rises from the centre below and falls to the next."""
-    edges_mel = np.linspace(0.0, 2595 * np.log10(1 + sample_rate / 2 / 700), bands + 2)
-    edges = 700 * (10 ** (edges_mel / 2595) - 1)
-    bins = np.arange(fft // 2 + 1) * sample_rate / fft
-    rising = (bins[:, None] - edges[:-2]) / np.diff(edges)[:-1]
-    falling = (edges[2:] - bins[:, None]) / np.diff(edges)[1:]
-    return np.clip(np.minimum(rising, falling), 0, None).astype(np.float32)
+        )  # [..., fft // 2 + 1, F]
+        return torch.log(power.transpose(-1, -2) @ self.filters + FLOOR)
 
 
 def sample_at(features: Tensor, fps: float, times_s: NDArray[Any]) -> Tensor:

@@ -1,4 +1,8 @@
-"""RASTA-PLP: what is said, with the microphone and the room filtered away."""
+"""RASTA-PLP: what is said, with the microphone and the room filtered away.
+
+torchaudio has mel cepstra, but no critical bands, no all-pole model and no RASTA filter; its `lfilter`, which could run
+the filter, keeps no state between pieces.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@ import pytest
 import soundfile
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.sound import resample as streamed_resample
+from facesynth.speech import audio as audio_module
 from facesynth.speech.audio import load_audio, require_sound, resample, save_wav
 
 
@@ -142,6 +144,39 @@ def test_resampling_keeps_time_and_pitch(rate, new_rate):
 
 def test_resampling_lets_nothing_alias():
     assert np.abs(resample(tone(44100, hz=12000), 44100, 16000)[500:-500]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("rate", "new_rate"), [(44100, 16000), (11025, 16000), (48000, 22050), (8000, 16000), (16000, 14720), (44056, 16000)]
+)
+def test_resampling_is_that_of_the_streams(rate, new_rate):
+    sound = np.random.default_rng(0).normal(0, 0.1, rate // 2 + 17).astype(np.float32)
+    np.testing.assert_allclose(resample(sound, rate, new_rate), streamed_resample(sound, rate, new_rate), atol=2e-7)
+
+
+@pytest.mark.parametrize(("rate", "new_rate"), [(44100, 16000), (11025, 48000), (16000, 22050)])
+def test_blocks_leave_no_seams(monkeypatch, rate, new_rate):
+    sound = np.random.default_rng(0).normal(0, 0.1, 5 * rate + 1).astype(np.float32)
+    whole = resample(sound, rate, new_rate)
+    monkeypatch.setattr(audio_module, "BLOCK", 20_000)
+    pieces = resample(sound, rate, new_rate)
+    assert len(pieces) == len(whole) == -(-len(sound) * new_rate // rate)
+    np.testing.assert_allclose(pieces, whole, atol=1e-6)
+
+
+@pytest.mark.parametrize(("rate", "new_rate"), [(44100, 16000), (16000, 44100), (48000, 22050)])
+def test_what_passes_and_what_is_stopped(rate, new_rate):
+    """Up to four fifths of half the lower rate nothing changes; from six fifths on, 50 dB are taken away."""
+    half = min(rate, new_rate) / 2
+    kept = resample(tone(rate, hz=0.8 * half), rate, new_rate)
+    np.testing.assert_allclose(kept[500:-500], tone(new_rate, hz=0.8 * half)[500:-500], atol=2e-3)
+    if new_rate < rate:
+        assert np.abs(resample(tone(rate, hz=1.2 * half), rate, new_rate)[500:-500]).max() < 0.5 * 10 ** (-50 / 20)
+
+
+def test_rates_with_nothing_in_common_take_no_gigabytes():
+    got = resample(tone(44101), 44101, 16000)
+    np.testing.assert_allclose(got[500:-500], tone(16000)[500:-500], atol=2e-3)
 
 
 def test_saved_wav_is_16_bit_and_clipped(tmp_path):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
+from facesynth.speech.audio import resample
 
 if TYPE_CHECKING:
     import av.container
@@ -153,18 +154,15 @@ def _mono(container: av.container.InputContainer, rate: int) -> Iterator[NDArray
 
 def _sound_at_file_rate(audio: ArrayLike, sample_rate: int) -> NDArray[np.float32]:
     """[S] at 48 kHz: every player takes it, and the last block of AAC then adds less than a frame of silence."""
-    from scipy.signal import resample_poly
-
     sound = np.asarray(audio, np.float32)
     if sound.ndim != 1 or not len(sound) or not np.isfinite(sound).all():
         raise FacesynthError(f"the sound must be finite mono samples [S], S > 0; got shape {sound.shape}")
     if not 1000 <= sample_rate <= 384000:
         raise FacesynthError(f"the sound's rate must be 1000 to 384000 Hz; got {sample_rate}")
     if sample_rate != _SOUND_RATE:
-        step = Fraction(_SOUND_RATE, int(sample_rate))
-        wanted = round(len(sound) * step)
-        sound = resample_poly(sound.astype(np.float64), step.numerator, step.denominator)[:wanted]
-    return np.clip(sound, -1, 1).astype(np.float32)
+        wanted = round(len(sound) * Fraction(_SOUND_RATE, int(sample_rate)))
+        sound = resample(sound, int(sample_rate), _SOUND_RATE)[:wanted]
+    return np.clip(sound, -1, 1)
 
 
 def _checked_frame(frame: NDArray[np.uint8], size: tuple[int, int] | None) -> NDArray[np.uint8]:
