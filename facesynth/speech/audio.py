@@ -80,7 +80,7 @@ def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np
 
 
 def _in_blocks(audio: NDArray[np.float32], up: int, down: int, around: int) -> NDArray[np.float32]:
-    """`up` samples for every `down`, block by block, so that long sounds take no more memory; `around` is what a filter reaches."""
+    """`up` samples for every `down`, in blocks that hold memory down; `around` samples are what the filter reaches."""
     import torch
 
     convolved = _resampler(up, down)
