@@ -16,7 +16,7 @@ import numpy as np
 
 from facesynth.face.draw.raster import FAR, bin_triangles, draw_depth, vertex_normals
 from facesynth.face.draw.render import Renderer, available_cores
-from facesynth.face.rig.rig import load_head, pose
+from facesynth.face.rig.arkit_rig import load_head, pose
 
 SIZE = (1280, 720)
 

@@ -20,8 +20,8 @@ from facesynth.capture.points.footage import read_footage
 from facesynth.corpus import Corpus
 from facesynth.face.draw.video import read_video, write_video
 from facesynth.face.files.npz import read_npz
+from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import LipGap
-from facesynth.face.rig.rig import load_head
 from facesynth.inference.lips import lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.speech.audio import load_audio

@@ -11,8 +11,9 @@ import numpy as np
 from facesynth.export.face import mesh_deformation_graph
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.models import export_model
+from facesynth.face.rig.anny import PARTS
+from facesynth.face.rig.arkit_rig import Rig, load_head
 from facesynth.face.rig.markers import marker_layout
-from facesynth.face.rig.rig import PARTS, Rig, load_head
 from facesynth.speech.audio import load_audio, resample, save_wav
 
 RATE = 16000

@@ -12,7 +12,7 @@ import click
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
-    from facesynth.face.rig.rig import Rig
+    from facesynth.face.rig.arkit_rig import Rig
     from facesynth.inference.speech import Speech
     from facesynth.methods.method import Method
     from facesynth.stage.performance import Performance
@@ -51,7 +51,7 @@ def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
     from facesynth.cli.speak import parse_size
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.performer.build import build_performer
     from facesynth.stage.performance import Stage, perform, write_performance
 

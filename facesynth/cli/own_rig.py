@@ -45,13 +45,14 @@ def own_head(options: dict[str, Any]) -> OwnHead | None:
 def as_arkit(method: Method, own: OwnHead | None, options: dict[str, Any], change: Change | None) -> Change | None:
     """What turns a motion of curves under own names into ARKit's, where a mapping says how; after `change`."""
     layout = method.fitted_layout
-    from facesynth.face.animation import arkit_columns
+    from facesynth.face.rig.arkit import arkit_columns
 
     is_own = layout is not None and layout.kind == "curves" and not arkit_columns(layout)
     if options["mapping"] is None or not is_own or (own is not None and set(own.names) <= set(layout.names)):
         return change
-    from facesynth.face.rig.channel_map import ChannelMap, read_mapping
-    from facesynth.face.rig.rig import ARKIT_NAMES
+    from facesynth.face.rig.arkit import ARKIT_NAMES
+    from facesynth.face.rig.channel_map import ChannelMap
+    from facesynth.face.rig.mapping_file import read_mapping
     from facesynth.inference.layout import Layout
 
     given = read_mapping(options["mapping"]).channels

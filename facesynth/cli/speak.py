@@ -170,7 +170,7 @@ def _check_feeling(method: Method, options: dict[str, Any]) -> None:
 
 def _speak_one(method: Method, path: Path, targets: list[Path], size: tuple[int, int], options: dict[str, Any]) -> dict[str, Any]:
     from facesynth.atomic import write_text
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.motion.planar import is_tracked
     from facesynth.stage.performance import Stage, perform, write_performance
 

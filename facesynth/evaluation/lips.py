@@ -93,7 +93,7 @@ def paired_gaps(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:
 
 def _opening_on_head(motion: Motion) -> Array:
     """[T] opening (mm) that ARKit curves give the built-in head; curves that the layout lacks are 0."""
-    from facesynth.face.rig.head import ARKIT_NAMES
+    from facesynth.face.rig.arkit import ARKIT_NAMES
 
     known = [i for i, name in enumerate(motion.layout.names) if name in ARKIT_NAMES]
     if not {"jawOpen", "mouthClose"} & set(motion.layout.names):
@@ -105,8 +105,8 @@ def _opening_on_head(motion: Motion) -> Array:
 
 @cache
 def _head_gap() -> LipGap:
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import LipGap
-    from facesynth.face.rig.rig import load_head
 
     try:
         return LipGap.of(load_head())

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.face.rig.deform import MeshDistanceDeformer
-from facesynth.face.rig.regions import RegionDeformer
-from facesynth.face.rig.rig import Rig
+from facesynth.face.deform.mesh_distance import MeshDistanceDeformer
+from facesynth.face.deform.regions import RegionDeformer
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.inference.layout import Layout
 
 

@@ -35,8 +35,8 @@ def export_face(folder: str | Path, weights: Weights = "float32") -> dict[str, A
     from facesynth.export.face import mesh_deformation_graph, region_deformation_graph
     from facesynth.export.solve import arkit_weights_graph
     from facesynth.export.warp import warp_graph
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import marker_layout
-    from facesynth.face.rig.rig import load_head
 
     rig = load_head()
     layout = marker_layout(rig)

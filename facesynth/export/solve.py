@@ -1,4 +1,4 @@
-"""ARKit weights from markers as a graph: the bounded least squares of `facesynth.face.rig.blendshapes`, by another road.
+"""ARKit weights from markers as a graph: the bounded least squares of `facesynth.face.solve.blendshapes`, by another road.
 
 Coordinate descent visits weights one by one, which a graph is slow at. The problem is strictly convex, so that any
 method ends in the same weights: here accelerated projected gradients on all frames at once, in coordinates in which
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.face.rig.blendshapes import GAP_WEIGHT, SMOOTHING_S, MarkerBasis, follow_gap, solve
-from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import Rig
+from facesynth.face.solve.blendshapes import GAP_WEIGHT, SMOOTHING_S, MarkerBasis, follow_gap, solve
 from facesynth.inference.layout import Layout
 
 STEPS = 6000

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.face.animation import FaceAnimation
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.channel_map import ChannelMap
-from facesynth.face.rig.rig import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from facesynth.cache import cache_dir
 from facesynth.corpus.corpus import Corpus
+from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout
-from facesynth.face.rig.rig import load_head
 from facesynth.inference.errors import FacesynthError
 from facesynth.performer.prosody import EMOTIONS
 from facesynth.performer.script import Size, load_script

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.face.rig.arkit_rig import Rig, pose_points
 from facesynth.face.rig.markers import marker_layout, marker_vertices
-from facesynth.face.rig.rig import Rig, pose_points
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import SILENCE

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.face.rig.head import ARKIT_NAMES
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import unknown
 from facesynth.inference.speech import EmotionTrack
 from facesynth.performer.articulation import Articulation

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
 from facesynth.face.rig.markers import LipGap
-from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import Speech
 from facesynth.performer.articulation import Articulation, articulate

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
+from facesynth.face.rig.arkit_rig import Rig, load_head
 from facesynth.face.rig.markers import LipGap
-from facesynth.face.rig.rig import Rig, load_head
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech

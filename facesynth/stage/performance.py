@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.animation import FaceAnimation, animate
+from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.write import SUFFIXES, require_arkit, write_animation
-from facesynth.face.rig.rig import Rig, pose
+from facesynth.face.rig.arkit_rig import Rig, pose
+from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
@@ -24,9 +25,9 @@ from facesynth.motion.sway import quiet_head
 from facesynth.progress import track
 
 if TYPE_CHECKING:
+    from facesynth.face.deform.skin import MarkerSkin
     from facesynth.face.draw.render import Renderer
     from facesynth.face.rig.own_head import OwnHead
-    from facesynth.face.rig.skin import MarkerSkin
 
 VIDEO_SUFFIXES = (".mp4",)
 OUTPUTS = (*VIDEO_SUFFIXES, *SUFFIXES)
@@ -82,7 +83,7 @@ def perform(
 def _skin(motion: Motion, animation: FaceAnimation, rig: Rig, stage: Stage) -> MarkerSkin | None:
     if stage.deform == "shapes":
         return None
-    from facesynth.face.rig.skin import marker_skin
+    from facesynth.face.deform.skin import marker_skin
 
     return marker_skin(stage.deform, rig, motion, animation)
 

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
-from facesynth.face.rig.head import head_folder
+from facesynth.face.rig.anny import head_folder
+from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout
-from facesynth.face.rig.rig import load_head
 from facesynth.inference.motion import Motion
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.efase.method import Efase

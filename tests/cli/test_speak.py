@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
-from facesynth.face.rig.head import head_folder
+from facesynth.face.rig.anny import head_folder
 from facesynth.methods.efase.method import Efase
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
@@ -87,8 +87,8 @@ def test_the_training_script_runs(shop, tmp_path, repository):
 
 @pytest.mark.usefixtures("head")
 def test_speak_writes_the_same_bytes_twice_and_explains(tmp_path):
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import marker_layout
-    from facesynth.face.rig.rig import load_head
 
     model = head_model(tmp_path, marker_layout(load_head()))
     outputs = []

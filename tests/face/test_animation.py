@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from facesynth.face.animation import FaceAnimation, animate, gaze_of
-from facesynth.face.rig.eyes import quiet_blinks, quiet_gaze
-from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights
+from facesynth.face.animation import FaceAnimation
+from facesynth.face.behaviour.eyes import quiet_blinks, quiet_gaze
+from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_of, gaze_weights
+from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -51,8 +52,8 @@ def test_own_eyes_are_used_and_scaled(rig):
 
 def test_the_head_moves_markers_as_the_motion_says(rig):
     """A pose about the rigid markers and one about the rig's pivot are the same movement of the points."""
+    from facesynth.face.rig.arkit_rig import pose_points
     from facesynth.face.rig.markers import marker_vertices
-    from facesynth.face.rig.rig import pose_points
     from facesynth.motion.pose import apply_head, rigid_points
 
     head = np.random.default_rng(0).normal(0, [0.2] * 3 + [5.0] * 3, (40, 6)).astype(np.float32)

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import lsq_linear
 
-from facesynth.face.rig.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve, solve_markers
+from facesynth.face.solve.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve, solve_markers
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 
@@ -30,8 +30,8 @@ def speech_like(rig, count=300, fps=120.0, seed=0):
 
 
 def markers_of(rig, weights):
+    from facesynth.face.rig.arkit_rig import pose_points
     from facesynth.face.rig.markers import marker_layout, marker_vertices
-    from facesynth.face.rig.rig import pose_points
 
     layout = marker_layout(rig)
     return layout, pose_points(rig, marker_vertices(rig, layout), weights).reshape(len(weights), -1)

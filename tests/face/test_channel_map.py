@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from own_heads import MAPPING, SHAPES
 
-from facesynth.face.rig.channel_map import Channel, ChannelMap, arkit_name, read_mapping
-from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.channel_map import Channel, ChannelMap, arkit_name
+from facesynth.face.rig.mapping_file import read_mapping
 from facesynth.inference.errors import FacesynthError
 
 

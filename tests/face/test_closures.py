@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from facesynth.face.animation import animate
-from facesynth.face.rig.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.markers import LipGap, marker_layout
-from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.face.solve.animate import animate
+from facesynth.face.solve.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack

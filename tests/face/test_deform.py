@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.face.rig.deform import (
+from facesynth.face.deform.mesh_distance import (
     REACH,
     SIGMA,
     MeshDistanceDeformer,
@@ -107,7 +107,7 @@ def test_scalp_ears_and_shoulders_stay(rig, deformer, layout):
 
 
 def test_teeth_and_tongue_follow_the_jaw_and_not_the_lips(rig, deformer, layout, vertices):
-    from facesynth.face.rig.rig import pose_points
+    from facesynth.face.rig.arkit_rig import pose_points
 
     inner = rig.vertices_of("lower_teeth", "tongue")
     for shape, weight in (("jawOpen", 0.4), ("mouthLowerDownLeft", 0.8), ("mouthPucker", 0.8)):

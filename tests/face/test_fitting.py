@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facesynth.face.animation import animate
-from facesynth.face.rig.fitting import fit_layout, is_of_the_head, rest_of, similarity
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import pose_points
 from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
-from facesynth.face.rig.rig import ARKIT_NAMES, pose_points
+from facesynth.face.solve.animate import animate
+from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of, similarity
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -75,7 +76,7 @@ def test_known_names_in_any_order_on_another_face_give_the_same_weights(rig, tal
 
 
 def test_names_of_landmarks_from_video_find_their_place(rig):
-    from facesynth.face.rig.landmark_names import LANDMARKS
+    from facesynth.face.solve.landmark_names import LANDMARKS
 
     own = marker_layout(rig)
     names = tuple(f"p{number:03d}" for number in range(468))

@@ -3,8 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import pose
 from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
-from facesynth.face.rig.rig import ARKIT_NAMES, pose
 from facesynth.inference.errors import FacesynthError
 
 

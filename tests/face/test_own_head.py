@@ -9,8 +9,8 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.face.draw.own_render import OwnRenderer
 from facesynth.face.files.own import write_own
 from facesynth.face.own_animation import OwnAnimation, on_channels
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.own_head import load_own_head
-from facesynth.face.rig.rig import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 
 

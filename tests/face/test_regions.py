@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from facesynth.face.rig.deform import edge_lengths
+from facesynth.face.deform.mesh_distance import edge_lengths
+from facesynth.face.deform.regions import REGIONS, RegionDeformer, region_markers, region_shares
+from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout, marker_vertices
-from facesynth.face.rig.regions import REGIONS, RegionDeformer, region_markers, region_shares
-from facesynth.face.rig.rig import load_head
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 

@@ -5,7 +5,8 @@ from facesynth.face.draw import render
 from facesynth.face.draw.bake import baked_head
 from facesynth.face.draw.occlusion import sky_directions, sky_visibility
 from facesynth.face.draw.render import Camera, Renderer
-from facesynth.face.rig.rig import ARKIT_NAMES, pose
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import pose
 from facesynth.inference.errors import FacesynthError
 
 SIZE = (160, 90)

@@ -3,8 +3,9 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from facesynth.face.rig.head import build_head, head_folder
-from facesynth.face.rig.rig import ARKIT_NAMES, PIVOT_MM, gaze_weights, load_head, pose, pose_points
+from facesynth.face.rig.anny import build_head, head_folder
+from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.arkit_rig import PIVOT_MM, load_head, pose, pose_points
 from facesynth.inference.errors import FacesynthError
 
 

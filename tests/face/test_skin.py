@@ -3,11 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from facesynth.face.animation import animate
-from facesynth.face.rig.landmark_names import LANDMARKS
+from facesynth.face.deform.skin import marker_skin, on_head_markers, shown_blinks
+from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout, marker_vertices
-from facesynth.face.rig.rig import load_head
-from facesynth.face.rig.skin import marker_skin, on_head_markers, shown_blinks
+from facesynth.face.solve.animate import animate
+from facesynth.face.solve.landmark_names import LANDMARKS
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion

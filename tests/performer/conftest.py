@@ -7,7 +7,7 @@ from facesynth.inference.errors import FacesynthError
 
 @pytest.fixture(scope="session")
 def rig():
-    from facesynth.face.rig.rig import load_head
+    from facesynth.face.rig.arkit_rig import load_head
 
     try:
         return load_head()

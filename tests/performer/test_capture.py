@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from acting import BILABIAL_RICH, act, speech_of
 
-from facesynth.face.rig.rig import pose_points
+from facesynth.face.rig.arkit_rig import pose_points
 from facesynth.motion.gaps import fill_gaps
 from facesynth.performer import capture as stage
 from facesynth.performer.capture import SWAPS, Fault, capture, plan_faults

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from acting import BILABIAL_RICH, act, hum, per_phone, speech_of
 
-from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import BILABIALS, OPEN_VOWELS
 from facesynth.inference.speech import EmotionTrack, Speech

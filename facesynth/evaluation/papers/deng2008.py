@@ -33,7 +33,7 @@ def findings(material: Material) -> list[Finding]:
         *trajectories(spoken, "figs 15, 16"),
         not_available("table 5", "the same on a graphics card, s", values(SECONDS_GPU), "measured on the processor alone"),
         not_implemented("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps"),
-        not_available("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.rig.deform`"),
+        not_available("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.deform.mesh_distance`"),
     ]
 
 

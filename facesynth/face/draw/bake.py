@@ -17,8 +17,8 @@ from facesynth.face.draw.raster import vertex_normals
 from facesynth.face.draw.shading import EYE, HIDDEN, SKIN, TEETH, TONGUE, Surface
 from facesynth.face.draw.strands import Skin, Strands, grow_all, hair_volume_mm
 from facesynth.face.draw.subdivision import catmull_clark, refine_corners
-from facesynth.face.rig.head import head_folder, head_key
-from facesynth.face.rig.rig import PARTS, Rig, pose
+from facesynth.face.rig.anny import PARTS, head_folder, head_key
+from facesynth.face.rig.arkit_rig import Rig, pose
 
 _VERSION = 2  # raise it whenever what is baked changes
 _MATERIALS = np.array([SKIN, EYE, EYE, TEETH, TEETH, TONGUE, HIDDEN, HIDDEN, HIDDEN, HIDDEN], np.uint8)

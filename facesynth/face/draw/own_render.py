@@ -14,8 +14,8 @@ from facesynth.face.draw.render import Camera, available_cores, backdrop, displa
 from facesynth.face.draw.shading import KEY, SKIN, Shot, Surface, with_bounds
 from facesynth.face.draw.tiles import Bins, Hair, draw_tiles
 from facesynth.face.own_animation import OwnAnimation
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.own_head import OwnHead
-from facesynth.face.rig.rig import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
 

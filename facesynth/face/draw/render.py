@@ -16,8 +16,8 @@ from facesynth.face.draw.occlusion import orthographic
 from facesynth.face.draw.raster import FAR, TILE, bin_segments, bin_triangles, draw_depth, nearest_first, project, vertex_normals
 from facesynth.face.draw.shading import HIDDEN, KEY, Shot, with_bounds
 from facesynth.face.draw.tiles import Bins, Hair, draw_tiles, light_hair
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import INNER_LIPS
-from facesynth.face.rig.rig import Rig
 from facesynth.inference.errors import FacesynthError
 
 _SHADOW_SIZE, _SHADOW_HALF_MM = 512, 190.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig.rig import PIVOT_MM
+from facesynth.face.rig.arkit_rig import PIVOT_MM
 
 # BVH turns about the axes in the order of its channels, each about the axis already turned: Z, X, Y here,
 # "ZXY" intrinsic. Positions are in centimetres, which is what character animation programs take a unit for.

@@ -15,7 +15,8 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf_buffer import Buffer
 from facesynth.face.files.mesh import TriangleMesh
 from facesynth.face.files.skin_picture import skin_jpeg
-from facesynth.face.rig.rig import PARTS, PIVOT_MM, Rig
+from facesynth.face.rig.anny import PARTS
+from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
 
 M_PER_MM = 1e-3  # glTF counts in metres
 EYES = ("left_eye", "right_eye")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facesynth.atomic import write_text
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, rate_of, timecode
-from facesynth.face.rig.rig import ARKIT_NAMES
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.rig.rig import PARTS, Rig
+from facesynth.face.rig.anny import PARTS
+from facesynth.face.rig.arkit_rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from facesynth.face.draw.albedo import HAIR, brow_shade, spread
 from facesynth.face.draw.bake import baked_head, fine_corner_uv
-from facesynth.face.rig.rig import Rig
+from facesynth.face.rig.arkit_rig import Rig
 
 SIDE = 2048
 """Pixels along the side of the picture."""

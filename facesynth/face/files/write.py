@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
 

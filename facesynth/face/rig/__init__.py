@@ -1,1 +1,1 @@
-"""Heads that move, and the movement of recorded points carried over to them."""
+"""Heads that move: the built-in one with ARKit's 52 shapes, and heads of one's own."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.files.gltf_read import Part, Scene, read_scene
-from facesynth.face.rig.channel_map import ChannelMap, HeadMapping, read_mapping
+from facesynth.face.rig.channel_map import ChannelMap
+from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
 from facesynth.face.rig.obj import read_shapes
 from facesynth.inference.errors import FacesynthError, unknown
 

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files import write_animation
-from facesynth.face.rig.rig import ARKIT_NAMES, gaze_weights, pose
+from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.arkit_rig import pose
 
 _spec = importlib.util.spec_from_file_location("gltf_rules", Path(__file__).with_name("gltf_rules.py"))
 gltf_rules = importlib.util.module_from_spec(_spec)

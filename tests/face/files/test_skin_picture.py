@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from facesynth.face.files.skin_picture import SIDE, skin_jpeg
+from facesynth.face.rig.anny import PARTS
 from facesynth.face.rig.markers import INNER_LIPS
-from facesynth.face.rig.rig import PARTS
 
 
 @pytest.fixture(scope="module")

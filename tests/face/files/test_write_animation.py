@@ -11,7 +11,8 @@ from facesynth.face.files import SUFFIXES, write_animation
 from facesynth.face.files.livelink import COUNT, HEADER, read_livelink, take_of, write_livelink
 from facesynth.face.files.npz import read_npz
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, timecode
-from facesynth.face.rig.rig import ARKIT_NAMES, PIVOT_MM
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import PIVOT_MM
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from torch import nn
 
-from facesynth.face.rig.deform import LASHES, MeshDistanceDeformer, marker_spacing_mm, surface_distances
+from facesynth.face.deform.mesh_distance import LASHES, MeshDistanceDeformer, marker_spacing_mm, surface_distances
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import marker_vertices
-from facesynth.face.rig.rig import Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 

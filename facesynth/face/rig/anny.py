@@ -13,20 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.obj import ObjMesh, read_obj, read_target
 from facesynth.inference.errors import FacesynthError
-
-ARKIT_NAMES: tuple[str, ...] = (
-    *(f"eye{what}{side}" for side in ("Left", "Right")
-      for what in ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")),
-    "jawForward", "jawRight", "jawLeft", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker", "mouthRight", "mouthLeft",
-    *(f"mouth{what}{side}" for what in ("Smile", "Frown", "Dimple", "Stretch") for side in ("Left", "Right")),
-    "mouthRollLower", "mouthRollUpper", "mouthShrugLower", "mouthShrugUpper",
-    *(f"mouth{what}{side}" for what in ("Press", "LowerDown", "UpperUp") for side in ("Left", "Right")),
-    "browDownLeft", "browDownRight", "browInnerUp", "browOuterUpLeft", "browOuterUpRight",
-    "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight", "tongueOut",
-)  # fmt: skip
-"""The 52 shapes in the column order of Live Link Face; Left and Right are the performer's."""
 
 PARTS: tuple[str, ...] = (
     "skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue",

@@ -12,8 +12,9 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 from torch import nn
 
+from facesynth.face.rig.anny import PARTS
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import marker_vertices
-from facesynth.face.rig.rig import PARTS, Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 

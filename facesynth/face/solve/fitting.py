@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.face.rig.landmark_names import KNOWN_POINTS, LANDMARKS
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import HEAD_MARKERS, INNER_LIPS, marker_layout
-from facesynth.face.rig.rig import ARKIT_NAMES, Rig
+from facesynth.face.solve.landmark_names import KNOWN_POINTS, LANDMARKS
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.lips import lip_gap

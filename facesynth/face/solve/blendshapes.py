@@ -11,13 +11,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import marker_vertices
-from facesynth.face.rig.rig import ARKIT_NAMES, Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 
 if TYPE_CHECKING:
-    from facesynth.face.rig.fitting import LayoutFit
+    from facesynth.face.solve.fitting import LayoutFit
 
 TOLERANCE = 2e-5
 """The solver stops when a sweep over all weights moves none by more than this."""

@@ -12,16 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
-from facesynth.face.rig.head import ARKIT_NAMES, PARTS, build_head, head_folder, head_key
+from facesynth.face.rig.anny import PARTS, build_head, head_folder, head_key
+from facesynth.face.rig.arkit import ARKIT_NAMES, checked_weights, eye_rotations, gaze_weights
 from facesynth.inference.errors import FacesynthError
-
-__all__ = ["ARKIT_NAMES", "PARTS", "PIVOT_MM", "Rig", "gaze_weights", "load_head", "pose", "pose_points"]
 
 PIVOT_MM = np.array([0.0, -105.0, 35.0])
 """The head turns about this point, at the top of the neck."""
-
-LOOK_OUT_RAD, LOOK_UP_RAD, LOOK_DOWN_RAD = np.radians([24.0, 12.0, 20.0])
-"""Turn of an eye at weight 1 of eyeLookOut and eyeLookIn, eyeLookUp and eyeLookDown."""
 
 _TONGUE_LIFT_MM = 4.5
 
@@ -115,7 +111,7 @@ def pose(
     tongue_up : 0..1, lifts the tip of the tongue, for which ARKit has no shape
     skin_mm : [V, 3] displacements that are added to those of the weights, before the head turns
     """
-    values = _checked_weights(weights)[None]
+    values = checked_weights(weights)[None]
     if gaze is not None:
         values = gaze_weights(values, np.asarray(gaze, np.float64)[None])
     active = np.nonzero(values[0])[0]
@@ -132,35 +128,12 @@ def pose(
 def pose_points(rig: Rig, vertex_indices: ArrayLike, weights: ArrayLike, head: ArrayLike | None = None) -> NDArray[np.float32]:
     """Tracks [T, K, 3] in mm of K skin vertices under weights [T, 52] and head [T, 6]; linear in the weights."""
     index = np.asarray(vertex_indices, np.int64)
-    values = _checked_weights(weights)
+    values = checked_weights(weights)
     basis = rig.shapes_mm[:, index].reshape(len(ARKIT_NAMES), -1).astype(np.float64)
     points = rig.rest_mm[index] + (values @ basis).reshape(-1, len(index), 3)
     if head is not None:
         points = _follow_head(points, rig.head_weight[index], np.asarray(head))
     return points.astype(np.float32)
-
-
-def gaze_weights(weights: ArrayLike, gaze: ArrayLike) -> NDArray[np.float64]:
-    """Weights [T, 52] whose eight eyeLook weights turn both eyes to gaze [T, 2] (rad to the left, up)."""
-    values = _checked_weights(weights).copy()
-    left, up = np.asarray(gaze, np.float64).T
-    for side, outward in (("Left", left), ("Right", -left)):
-        for name, turn, full in (
-            ("Out", outward, LOOK_OUT_RAD), ("In", -outward, LOOK_OUT_RAD), ("Up", up, LOOK_UP_RAD), ("Down", -up, LOOK_DOWN_RAD)
-        ):  # fmt: skip
-            values[..., ARKIT_NAMES.index(f"eyeLook{name}{side}")] = np.clip(turn / full, 0, 1)
-    return values
-
-
-def eye_rotations(weights: NDArray[np.float64]) -> tuple[Rotation, Rotation]:
-    """How the left and the right eyeball turn under weights [52]: the source's shapes only shift them."""
-    look = {name: weights[i] for i, name in enumerate(ARKIT_NAMES) if name.startswith("eyeLook")}
-    turns = []
-    for side, outward in (("Left", 1), ("Right", -1)):
-        yaw = outward * LOOK_OUT_RAD * (look[f"eyeLookOut{side}"] - look[f"eyeLookIn{side}"])
-        pitch = LOOK_DOWN_RAD * look[f"eyeLookDown{side}"] - LOOK_UP_RAD * look[f"eyeLookUp{side}"]
-        turns.append(Rotation.from_euler("YX", [yaw, pitch]))
-    return turns[0], turns[1]
 
 
 def _lift_tongue(rig: Rig, vertices: NDArray[np.float32], amount: float) -> None:
@@ -177,12 +150,3 @@ def _follow_head(points: NDArray, head_weight: NDArray[np.float32], head: NDArra
     turn = Rotation.from_rotvec(head[:, :3]).as_matrix()
     moved = (points - PIVOT_MM) @ np.swapaxes(turn, 1, 2) + PIVOT_MM + head[:, None, 3:]
     return (points + head_weight[:, None] * (moved - points)).astype(points.dtype)
-
-
-def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
-    values = np.asarray(weights, np.float64)
-    if values.ndim not in (1, 2) or values.shape[-1] != len(ARKIT_NAMES):
-        raise FacesynthError(f"weights must have shape [{len(ARKIT_NAMES)}] or [T, {len(ARKIT_NAMES)}]; got {values.shape}")
-    if not np.isfinite(values).all():
-        raise FacesynthError("weights hold NaN or infinite values; fill gaps before posing")
-    return values

@@ -10,12 +10,13 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from facesynth.face.animation import BLINKS, FaceAnimation
-from facesynth.face.rig.deform import MeshDistanceDeformer
-from facesynth.face.rig.fitting import fit_layout, is_of_the_head, rest_of
+from facesynth.face.animation import FaceAnimation
+from facesynth.face.deform.mesh_distance import MeshDistanceDeformer
+from facesynth.face.deform.regions import RegionDeformer
+from facesynth.face.rig.arkit import BLINKS
+from facesynth.face.rig.arkit_rig import Rig, pose
 from facesynth.face.rig.markers import marker_layout, marker_vertices
-from facesynth.face.rig.regions import RegionDeformer
-from facesynth.face.rig.rig import Rig, pose
+from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion

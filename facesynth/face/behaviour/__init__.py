@@ -1,0 +1,1 @@
+"""What a face does that nobody recorded: blinks, gaze, the tongue."""

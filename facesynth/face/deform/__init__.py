@@ -1,0 +1,1 @@
+"""A mesh moved by markers themselves, without shapes between."""

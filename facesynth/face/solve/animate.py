@@ -1,0 +1,155 @@
+"""From a motion to an animation of the built-in head."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.face.animation import FaceAnimation
+from facesynth.face.behaviour.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
+from facesynth.face.behaviour.tongue import TIP_OUT, TIP_UP, tongue_track
+from facesynth.face.rig.arkit import ARKIT_NAMES, BLINKS, arkit_columns, gaze_of, gaze_weights
+from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
+from facesynth.face.rig.markers import LipGap, marker_vertices
+from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
+from facesynth.face.solve.closures import with_lips_apart, with_lips_met
+from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.pose import rigid_points
+
+ALREADY_BLINKS = 0.5
+"""A motion whose lids shut this far has blinks of its own."""
+
+
+def animate(
+    motion: Motion,
+    rig: Rig,
+    *,
+    head_gain: float = 1.0,
+    eyes_gain: float = 1.0,
+    seed: int = 0,
+    phones: PhoneTrack | None = None,
+) -> FaceAnimation:
+    """Put a motion on a rig, at the motion's rate.
+
+    Points become weights by bounded least squares on the rig, wherever they lie on it (`fit_layout`); curves with ARKit
+    names pass through, and where no curve has such a name all keep their own. Blinks and
+    gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`, and so do
+    the lips of another performer's points at p, b and m; those lips never pass through each other.
+
+    Parameters
+    ----------
+    head_gain : factor on the head's turns and shifts; 0 keeps it still
+    eyes_gain : factor on the gaze; 0 keeps the eyes open and straight
+    """
+    for name, gain in (("head_gain", head_gain), ("eyes_gain", eyes_gain)):
+        if not (np.isfinite(gain) and gain >= 0):
+            raise FacesynthError(f"{name} must be 0 (off) or a positive factor; got {gain}")
+    _check_whole(motion)
+    head = _head_on(rig, motion, head_gain)
+    gaze = _gaze(motion, head, seed) * eyes_gain
+    if motion.layout.kind == "curves" and not arkit_columns(motion.layout):
+        values = np.clip(motion.frames, 0, 1)
+        return FaceAnimation(motion.layout.names, values, head, gaze, np.zeros(len(motion)), motion.fps)
+    weights, residual = _weights(motion, rig, phones)
+    shut = _lids(motion, weights, seed) if eyes_gain else np.zeros(len(motion))
+    _set_lids(weights, shut, awake=eyes_gain == 0)
+    weights = gaze_weights(weights, gaze)
+    weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
+    tip = np.clip(tongue_track(TIP_UP, phones, len(motion), motion.fps), 0, 1)
+    return FaceAnimation(rig.names, np.clip(weights, 0, 1), head, gaze, tip, motion.fps, residual)
+
+
+def _check_whole(motion: Motion) -> None:
+    if not len(motion):
+        raise FacesynthError("a motion without frames cannot be put on a face")
+    for name in ("frames", "head", "eyes"):
+        values = getattr(motion, name)
+        if values is not None and not np.isfinite(values).all():
+            raise FacesynthError(f"{name} of the motion hold NaN or infinite values; fill the gaps first")
+
+
+def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    if motion.layout.kind == "curves":
+        return _curves(motion), None
+    from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
+
+    known = np.zeros((len(motion), len(rig.names)))
+    if motion.eyes is not None:
+        known = gaze_weights(known, motion.eyes[:, 1:])
+    if is_of_the_head(motion.layout):
+        return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
+    fit = fit_layout(rig, motion.layout, rest_of(motion))
+    frames = fit.on_head(rig, motion.frames).reshape(len(motion), -1)
+    weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
+    lips = LipGap.of(rig)
+    met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
+    return with_lips_apart(met, lips), residual
+
+
+def _curves(motion: Motion) -> NDArray[np.float64]:
+    weights = np.zeros((len(motion), len(ARKIT_NAMES)))
+    for name, column in arkit_columns(motion.layout).items():
+        weights[:, ARKIT_NAMES.index(name)] = np.clip(motion.frames[:, column], 0, 1)
+    return weights
+
+
+# A motion's pose turns the head about the centroid c of its neutral rigid markers, the rig's about its pivot p:
+# R (x - c) + c + t = R (x - p) + p + t'  with  t' = t + (R - 1)(p - c).
+def _head_on(rig: Rig, motion: Motion, gain: float) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    if motion.head is None:
+        return np.zeros((len(motion), 6))
+    head = motion.head.astype(np.float64) * gain
+    lever = PIVOT_MM - _pose_centre(rig, motion)
+    head[:, 3:] += Rotation.from_rotvec(head[:, :3]).apply(lever) - lever
+    return head
+
+
+def _pose_centre(rig: Rig, motion: Motion) -> NDArray[np.float64]:
+
+    layout = motion.layout
+    if layout.kind != "markers":
+        return PIVOT_MM
+    if not is_of_the_head(layout):
+        return fit_layout(rig, layout, rest_of(motion)).placed_mm()[rigid_points(layout)].mean(axis=0)
+    rigid = rigid_points(layout)
+    if layout.neutral is not None:
+        return np.asarray(layout.neutral).reshape(-1, 3)[rigid].mean(axis=0)
+    return rig.rest_mm[marker_vertices(rig, layout)[rigid]].mean(axis=0).astype(np.float64)
+
+
+def _gaze(motion: Motion, head: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    if motion.eyes is not None:
+        return motion.eyes[:, 1:].astype(np.float64)
+    curves = {f"eyeLook{way}Left" for way in ("In", "Out", "Up", "Down")} & set(motion.layout.names)
+    if curves:
+        return gaze_of(_curves(motion))
+    return quiet_gaze(len(motion), motion.fps, seed) + holding_the_viewer(head)
+
+
+def _lids(motion: Motion, weights: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    """[T] how far blinks shut the lids, on top of what the expression does."""
+    if motion.eyes is not None:
+        return np.clip(1 - motion.eyes[:, 0].astype(np.float64), 0, 1)
+    seen = weights[:, [ARKIT_NAMES.index(name) for name in BLINKS]].min(axis=1)
+    if (seen > ALREADY_BLINKS).any():
+        return np.zeros(len(motion))
+    return quiet_blinks(len(motion), motion.fps, seed)
+
+
+def _set_lids(weights: NDArray[np.float64], shut: NDArray[np.float64], *, awake: bool) -> None:
+    for side in ("Left", "Right"):
+        blink, squint, wide = (ARKIT_NAMES.index(f"eye{what}{side}") for what in ("Blink", "Squint", "Wide"))
+        weights[:, blink] = 0.0 if awake else np.maximum(weights[:, blink], shut)
+        weights[:, [squint, wide]] *= 1 - shut[:, None]
+
+
+def _tongue_out(weights: NDArray[np.float64], rig: Rig, phones: PhoneTrack | None, fps: float) -> NDArray[np.float64]:
+    """The tongue comes out between lips that are open; through shut lips it would show."""
+    own = weights[:, rig.index("tongueOut")[0]]
+    room = np.clip((LipGap.of(rig).opening_mm(weights) - 1.0) / 3.0, 0, 1)
+    return np.maximum(own, tongue_track(TIP_OUT, phones, len(weights), fps) * room)
