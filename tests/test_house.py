@@ -1,6 +1,7 @@
 """The direction of the arrows: rooms import down only, and no private names of each other."""
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,18 @@ def test_nothing_imports_gpl_packages():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "") or ""]
             assert not {name.split(".")[0] for name in names} & {"piper", "parselmouth", "espeakng_loader"}, path
+
+
+def test_inference_imports_numpy_and_onnxruntime_alone():
+    """It is built a second time as a distribution of its own, under another name: its own modules it names relatively."""
+    allowed = {"numpy", "onnxruntime", *sys.stdlib_module_names}
+    for path in (ROOT / "inference").rglob("*.py"):
+        depth = len(path.relative_to(ROOT / "inference").parts)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                strangers = {alias.name.split(".")[0] for alias in node.names} - allowed
+                assert not strangers, f"{path.relative_to(ROOT)} imports {sorted(strangers)}"
+            if isinstance(node, ast.ImportFrom) and node.level == 0:
+                assert node.module.split(".")[0] in allowed, f"{path.relative_to(ROOT)} imports {node.module}"
+            if isinstance(node, ast.ImportFrom):
+                assert node.level <= depth, f"{path.relative_to(ROOT)} reaches out of inference"

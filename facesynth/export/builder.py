@@ -14,7 +14,8 @@ import onnx
 from numpy.typing import ArrayLike, NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-OPSET = 20
+from facesynth.inference.folder import OPSET
+
 IR_VERSION = 9
 """Read by onnxruntime 1.20 and newer."""
 TYPES = {"float16": TensorProto.FLOAT16, "float32": TensorProto.FLOAT, "float64": TensorProto.DOUBLE, "int64": TensorProto.INT64}

@@ -17,15 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth import __version__
-from facesynth.export.builder import OPSET
 from facesynth.export.graph import Graph, Parity, check_parity
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.folder import ARRAYS, FORMAT, MANIFEST, OPSET, digest
+from facesynth.inference.phones import PHONES, viseme_of
 from facesynth.progress import track
-
-FORMAT = 2
-"""Of the manifest; a runtime refuses another one."""
-MANIFEST = "manifest.json"
-ARRAYS = "arrays.npz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +91,6 @@ def _require_free(folder: Path) -> None:
 
 
 def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[str, Parity]) -> dict[str, Any]:
-    from facesynth.inference.phones import PHONES, viseme_of
-
     files = sorted(path for path in part.iterdir())
     manifest: dict[str, Any] = {
         "format": FORMAT,
@@ -132,12 +126,6 @@ def _entry(graph: Graph, parity: Parity) -> dict[str, Any]:
         "outputs": [port.to_dict() for port in graph.outputs],
         "parity": {"largest_relative_difference": parity.relative, "batch_and_length": [list(s) for s in parity.sizes]},
     }
-
-
-def digest(manifest: Mapping[str, Any]) -> str:
-    """sha256 of the manifest without its own hash, keys sorted."""
-    plain = {key: value for key, value in manifest.items() if key != "sha256"}
-    return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def sha256_of(path: Path) -> str:

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
+PASS, ORDER = 0.9, 6
+"""Movement up to this share of the new rate's Nyquist frequency is kept when a rate falls, by a Butterworth filter."""
 QUICK_S, ROUGH_S = 0.08, 0.02
 """Movement between these is raised by `sharpen`; what is quicker is smoothed away."""
 
@@ -125,23 +127,18 @@ def _bends(signal: Floats) -> Floats:
     return bends
 
 
-def smoothed(piece: Floats, weights: Floats, stiffness: float) -> Floats:
-    """Frames [n, C], n >= 5, of `min sum w_k (g_k - f_k)² + stiffness ∫ g''²`, the natural cubic smoothing spline (Reinsch)."""
-    count = len(piece)
-    Q = np.zeros((count, count - 2))
-    k = np.arange(count - 2)
-    Q[k, k], Q[k + 1, k], Q[k + 2, k] = 1.0, -2.0, 1.0
-    R = np.diag(np.full(count - 2, 2 / 3)) + np.diag(np.full(count - 3, 1 / 6), 1) + np.diag(np.full(count - 3, 1 / 6), -1)
-    spread = Q / weights[:, None]
-    return piece - stiffness * spread @ np.linalg.solve(R + stiffness * Q.T @ spread, Q.T @ piece)
+def at_rate(frames: Floats, fps: float, new_fps: float, at: Floats) -> Floats:
+    """Frames [T, C] read at places [n] in old frames; movement that the new rate cannot carry is filtered out first."""
+    if falls(fps, new_fps) and len(frames) > 1:
+        frames = forth_and_back(butterworth(ORDER, PASS * new_fps / fps), frames, reach_of(len(frames), fps, new_fps))
+    return spline_at(frames, at)
 
 
-def time_warp(frames: Floats, count: int) -> Floats:
-    """Frames [L, C] stretched linearly to [count, C], first and last kept; one frame of many is the middle."""
-    length = len(frames)
-    if count == length:
-        return frames.copy()
-    at = np.array([(length - 1) / 2]) if count == 1 else np.linspace(0, length - 1, count)
-    low = np.minimum(at.astype(np.int64), max(length - 2, 0))
-    share = (at - low)[:, None]
-    return frames[low] * (1 - share) + frames[np.minimum(low + 1, length - 1)] * share
+def falls(fps: float, new_fps: float) -> bool:
+    """Whether a change of rate takes out what the new one cannot carry: nothing where the rate hardly falls."""
+    return new_fps < PASS * fps
+
+
+def reach_of(count: int, fps: float, new_fps: float) -> int:
+    """Frames by which `count` frames are continued at each end while they are filtered for a lower rate."""
+    return min(count - 1, round(3 * fps / new_fps) + 18)

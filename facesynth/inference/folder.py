@@ -7,7 +7,7 @@ import io
 import json
 import struct
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from .errors import FacesynthError
 
 FORMAT = 2
+"""Of the manifest: one is written, no other is read."""
 MANIFEST = "manifest.json"
 MOST_BYTES = 1 << 24
 """Of a manifest: a larger one is none."""
 ARRAYS = "arrays.npz"
 MOST_HEADER = 1 << 16
 """Of an array in a file, bytes."""
-OPSETS = (20,)
+OPSET = 20
 """Of the graphs."""
 KEYS = (
     "format", "method", "opset", "files", "graphs", "arrays", "layout", "fps", "sample_rate", "settings", "latency", "emotions",
@@ -147,15 +148,16 @@ def _manifest(path: Path) -> dict[str, Any]:
         raise FacesynthError(f"{path} lacks {', '.join(lacking)}; export the model again")
     if manifest["format"] != FORMAT:
         raise FacesynthError(f"{path} has format {manifest['format']}; this runtime reads {FORMAT}: export the model again")
-    if manifest["opset"] not in OPSETS:
+    if manifest["opset"] != OPSET:
         raise FacesynthError(
-            f"{path} states opset {manifest['opset']}; this runtime knows {OPSETS[0]}: export it again, or take a newer one"
+            f"{path} states opset {manifest['opset']}; this runtime knows {OPSET}: export it again, or take a newer one"
         )
-    if _digest(manifest) != manifest["sha256"]:
+    if digest(manifest) != manifest["sha256"]:
         raise FacesynthError(f"{path} was changed after it was written; export the model again")
     return manifest
 
 
-def _digest(manifest: dict[str, Any]) -> str:
+def digest(manifest: Mapping[str, Any]) -> str:
+    """sha256 of the manifest without its own hash, keys sorted."""
     plain = {key: value for key, value in manifest.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

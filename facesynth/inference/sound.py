@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import checked_piece, require_open
 from .errors import FacesynthError
 
-BLOCK = 8192
-"""Output samples computed at once."""
+FEW = 4
+"""Output samples of a kind, under which they are gathered."""
 KAISER_BETA = 5.0
 REACH = 10
 """Half length of the filter in periods of the lower rate."""
@@ -71,6 +71,9 @@ class Resampler:
         return given
 
 
+# Output sample k is a sum over the input samples around k * down / up, weighted with taps that depend on where k lies between
+# them: every `up`-th output has the same taps and lies `down` inputs further. Those go together, as windows of the input that
+# are looked at and not copied; a short piece, with few of each kind, is gathered at once. Sums are the same, bit for bit.
 def _resampled(audio: NDArray[Any], first: int, start: int, stop: int, rate: int, new_rate: int) -> NDArray[np.float32]:
     """Output samples start..stop of a sound whose samples from `first` on are given; around them there is silence."""
     common = gcd(rate, new_rate)
@@ -79,12 +82,15 @@ def _resampled(audio: NDArray[Any], first: int, start: int, stop: int, rate: int
     each = table.shape[1]
     padded = np.pad(np.asarray(audio, np.float64), (each, each))
     windows = np.lib.stride_tricks.sliding_window_view(padded, each)
-    out = np.empty(max(0, stop - start), np.float32)
-    for at in range(start, stop, BLOCK):
-        k = np.arange(at, min(at + BLOCK, stop), dtype=np.int64)
-        begins = -(-(k * down - reach) // up)
-        phase = begins * up - (k * down - reach)
-        out[k - start] = np.einsum("kn,kn->k", table[phase], windows[np.clip(begins - first + each, 0, len(windows) - 1)])
+    places = np.arange(start, max(start, stop), dtype=np.int64) * down - reach
+    begins = -(-places // up)
+    phases, begins = begins * up - places, begins - first + each
+    if len(places) < FEW * up:
+        return np.einsum("kn,kn->k", table[phases], windows[begins]).astype(np.float32)
+    out = np.empty(len(places), np.float32)
+    for k in range(up):
+        alike = out[k::up]
+        alike[:] = np.einsum("kn,n->k", windows[begins[k] :: down][: len(alike)], table[phases[k]])
     return out
 
 

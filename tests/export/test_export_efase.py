@@ -15,7 +15,8 @@ from facesynth.inference.efase.bounds import StepBounds
 from facesynth.inference.efase.nodes import Nodes, Query, Weights
 from facesynth.inference.efase.search import Search
 from facesynth.inference.efase.stream import GUARD_S
-from facesynth.inference.filters import butterworth, forth_and_back, gaussian, smoothed, spline_at
+from facesynth.inference.filters import butterworth, forth_and_back, gaussian, spline_at
+from facesynth.inference.joints import smoothing_spline
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.efase.costs import Query as TorchQuery
 from facesynth.methods.efase.costs import Weights as TorchWeights
@@ -316,7 +317,7 @@ def test_filters_and_splines_are_scipys(count, seed):
     if count >= 5:
         weights = rng.uniform(0.5, 2, count)
         wanted = make_smoothing_spline(np.arange(count, dtype=float), signal, w=weights, lam=0.7)(np.arange(count))
-        assert np.allclose(smoothed(signal, weights, 0.7), wanted, atol=1e-7)
+        assert np.allclose(smoothing_spline(signal, weights, 0.7), wanted, atol=1e-7)
     cutoffs, reach = np.array([0.1, 0.3, 0.75]), np.minimum([20, 7, 3], count - 1)
     sections = np.moveaxis([butterworth(6, c) for c in cutoffs], 0, -1)
     wanted = [sosfiltfilt(butter(6, c, output="sos"), s, padlen=r) for c, s, r in zip(cutoffs, signal.T, reach, strict=True)]

@@ -4,12 +4,11 @@ import shutil
 import numpy as np
 import pytest
 
-from facesynth.export.folder import digest
 from facesynth.export.graph import TOLERANCE, check_parity
 from facesynth.export.lds import lds_content
 from facesynth.export.models import export_model
 from facesynth.inference import FacesynthError, load
-from facesynth.inference.folder import open_folder
+from facesynth.inference.folder import digest, open_folder
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.registry import create
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from facesynth.inference.joints import smooth_joint
 from facesynth.inference.warp import time_warp
-from facesynth.motion.smoothing import smooth_joint
 
 
 def step(count, joint, height=3.0):

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..anime_graph.graph import Candidates, Nodes, Wish
 from ..anime_graph.hearing import Floats, Ints, warp_path, warp_paths
-from ..filters import gaussian, time_warp
+from ..filters import gaussian
+from ..warp import time_warp
 
 VELOCITY_LASTS_S = 0.04
 WARP_SMOOTHING = 2.0

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ..efase.nodes import Floats, Ints, Nodes
 from ..efase.soft import Mixture, stretched
-from ..filters import butterworth, forth_and_back, smoothed, spline_at, time_warp
+from ..joints import smooth_joint
 from ..layout import Layout
 from ..phones import SILENCE
+from ..warp import time_warp
 
 FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
 LOOSE = frozenset(["k", "g", "ch", "ng", "r"])
 SETTLE_S, WAKE_S, CLOSE_S = 0.25, 0.2, 0.03
-PASS = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def concatenate(
         if 0 < holder < len(path):
             inside = min(reach, int(bounds[holder] - bounds[holder - 1]), int(bounds[holder + 1] - bounds[holder]))
             if inside > 0:
-                _smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
+                frames = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ~spoken, [False]]).astype(int)))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if plan.expected is None:
@@ -78,23 +78,6 @@ def concatenate(
         else:
             _follow(frames, int(bounds[first]), int(bounds[stop]), plan.expected, fps)
     return frames
-
-
-def _smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float, strength: float) -> None:
-    """A share `strength` of the jump smoothed by a smoothing spline whose correction fades to 0 at the outer frames (eq. 13)."""
-    first, stop = max(joint - reach, 0), min(joint + reach, len(frames))
-    piece = frames[first:stop]
-    if len(piece) < 3:
-        return
-    if len(piece) >= 5:
-        correction = smoothed(piece, weights[first:stop], stiffness) - piece
-    else:
-        bend = np.diff(np.eye(len(piece)), n=2, axis=0)
-        system = np.diag(weights[first:stop]) + stiffness * bend.T @ bend
-        correction = np.linalg.solve(system, weights[first:stop, None] * piece) - piece
-    rise = np.clip(np.arange(len(piece)) / max(joint - first - 1, 1), 0, 1)
-    fall = np.clip(np.arange(len(piece))[::-1] / max(stop - joint - 1, 1), 0, 1)
-    frames[first:stop] = piece + strength * np.minimum(rise, fall)[:, None] * correction
 
 
 def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: float) -> None:
@@ -156,11 +139,3 @@ def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: Ints, fps
     points[:, upper, 1] -= push[:, None] / 2
     points[:, lower, 1] += push[:, None] / 2
     return out
-
-
-def at_rate(frames: Floats, fps: float, new_fps: float, at: Floats) -> Floats:
-    """Frames [T, C] read at places [n] in old frames; movement that the new rate cannot carry is filtered out first."""
-    if new_fps < PASS * fps and len(frames) > 1:
-        reach = min(len(frames) - 1, round(3 * fps / new_fps) + 18)
-        frames = forth_and_back(butterworth(6, PASS * new_fps / fps), frames, reach)
-    return spline_at(frames, at)

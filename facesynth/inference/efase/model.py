@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.assembly import Plan, Smoothing, at_rate, close_lips, concatenate, gap
+from ..efase.assembly import Plan, Smoothing, close_lips, concatenate, gap
 from ..efase.bounds import StepBounds
 from ..efase.nodes import Floats, Ints, Nodes, Query, Weights
 from ..efase.search import Search
 from ..efase.soft import Mixture, Softness, mixtures
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
-from ..filters import gaussian, sharpen
+from ..filters import at_rate, gaussian, sharpen
 from ..folder import Folder
 from ..graphs import Graph
 from ..layout import Layout

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..efase.assembly import SETTLE_S, WAKE_S, Plan
 from ..efase.nodes import Ints
 from ..errors import FacesynthError
+from ..filters import at_rate
 from ..phones import SILENCE
 from ..speech import frame_bounds
 
@@ -124,8 +125,6 @@ class EfaseStream:
         frames = model.frames(plans, self.labels[own], self.feelings[own], np.array(self.intensity[own]), bounds[first:] - zero)
         if self.fps == model.database_fps:
             return frames[np.minimum(np.arange(start, stop) - zero, len(frames) - 1)].astype(np.float32)
-        from ..efase.assembly import at_rate
-
         count = max(round(int(bounds[-1]) / model.database_fps * self.fps), 1)
         new = np.minimum(np.arange(start, stop), count - 1)
         at = np.minimum(new * model.database_fps / self.fps, int(bounds[-1]) - 1) - zero

@@ -7,8 +7,8 @@ import torch
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.sound import resample
 from facesynth.inference.speech import PhoneTrack, Speech
-from facesynth.speech.audio import resample
 from facesynth.speech.rasta_plp import RastaPlp
 
 RATE = 16000

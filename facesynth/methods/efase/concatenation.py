@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from facesynth.inference.joints import smooth_joint
 from facesynth.inference.warp import time_warp
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
 from facesynth.methods.efase.soft import Mixture, mean_motion
-from facesynth.motion.smoothing import smooth_joint
 
 FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
 """Phones whose shape must survive the smoothing (Deng 2008, §6.3)."""
@@ -97,8 +97,7 @@ def _smooth_joints(
         place = int(np.searchsorted(bounds, bounds[t], side="right")) - 1  # t, or the phone after those without frames
         inside = min(reach, int(bounds[place] - bounds[place - 1]), int(bounds[place + 1] - bounds[place]))
         if strength > 0 and inside > 0:
-            smooth = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness)
-            frames = smooth if strength == 1 else frames + strength * (smooth - frames)
+            frames = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
     return frames
 
 

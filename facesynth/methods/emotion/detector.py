@@ -18,12 +18,12 @@ from torch import Tensor, nn
 from facesynth.atomic import atomic_path
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.sound import resample
 from facesynth.inference.speech import EmotionTrack
 from facesynth.methods.emotion.paper_features import paper_features
 from facesynth.methods.emotion.svm import Kernel, Svm, SvmSettings
 from facesynth.methods.emotion.voice_features import voice_features
 from facesynth.progress import track
-from facesynth.speech.audio import resample
 
 RATE = 16000
 FORMAT = 1

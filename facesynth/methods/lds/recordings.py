@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.sound import resample
 from facesynth.progress import track
-from facesynth.speech.audio import resample
 from facesynth.speech.periodogram import RATE, Periodogram
 
 SHORTEST = 20

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus
+from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
-from facesynth.speech.audio import resample
 from facesynth.speech.mel import LogMel, sample_at
 
 
