@@ -12,8 +12,9 @@ from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.methods.efase.audio import PLACES, SPAN, PhoneSound
 from facesynth.methods.efase.nodes import Ints
-from facesynth.methods.learn.expectation import PHONE_SIZE, RATE, PosePredictor
+from facesynth.methods.learn.expectation import PHONE_SIZE, PosePredictor
 from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.network import RATE
 
 
 def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
-from torch import Tensor, nn
+from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.errors import FacesynthError
@@ -15,30 +15,10 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
 from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
-from facesynth.progress import track
-
-RATE = 50.0
-"""Frames of sound that the network reads per second, Hz: the 20 ms of the ridge's 21 frames."""
-WIDTH, KERNEL, DROPOUT = 128, 5, 0.3
-DILATIONS = (1, 1, 2, 2)
-"""Reach 12 frames to either side: ±240 ms."""
-BATCH, WINDOW = 16, 96
-"""Windows of a step, and frames of a window."""
-LEARNING_RATE, WEIGHT_DECAY = 2e-3, 1e-2
-
-
-class Tracks(NamedTuple):
-    """One utterance at RATE."""
-
-    heard: Tensor
-    """[F, 40] sound."""
-    moved: Tensor
-    """[F, D] motion, in units of its largest standard deviation."""
-    present: Tensor
-    """[F] 1 where the recording has a complete frame, 0 elsewhere."""
 
 
 @register("tcn")
@@ -52,8 +32,10 @@ class Tcn(Method):
     scale: Tensor
     """[1] standard deviation of the first component, unit of the layout."""
 
-    def __init__(self, components: int = 25, steps: int = 600) -> None:
+    def __init__(self, components: int = 25, steps: int = STEPS) -> None:
         super().__init__()
+        if steps < 1:
+            raise FacesynthError(f"tcn needs at least one step of training; got {steps}")
         self.components, self.steps = components, steps
         self.hearing = Hearing()
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
@@ -69,7 +51,7 @@ class Tcn(Method):
         self.scale = self.pca.encode(torch.from_numpy(frames)).std(dim=0).max().clamp(min=1e-6).reshape(1)
         tracks = [self._tracks(utterance) for utterance in corpus]
         self.network = network(self.hearing.mel.bands, self.pca.basis.shape[1], seed)
-        self.facts = {"loss": _train(self.network, tracks, self.steps, seed)}
+        self.facts = {"loss": train(self.network, tracks, self.steps, seed, "tcn: learning")}
         return self.eval()
 
     @torch.no_grad()
@@ -98,54 +80,3 @@ class Tcn(Method):
             torch.from_numpy(np.stack(moved, axis=1)).float(),
             torch.from_numpy(present[nearest]).float(),
         )
-
-
-def network(inputs: int, outputs: int, seed: int) -> nn.Sequential:
-    """[B, inputs, F] to [B, outputs, F]; first weights by seed, torch's own generator stays as it was."""
-    layers: list[nn.Module] = []
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        for before, dilation in zip((inputs, WIDTH, WIDTH, WIDTH), DILATIONS, strict=True):
-            layers += [nn.Conv1d(before, WIDTH, KERNEL, padding="same", dilation=dilation), nn.ReLU(), nn.Dropout(DROPOUT)]
-        return nn.Sequential(*layers, nn.Conv1d(WIDTH, outputs, 1))
-
-
-def _train(model: nn.Sequential, tracks: list[Tracks], steps: int, seed: int) -> float:
-    """Learn, and return the mean loss of the last tenth of the steps."""
-    if steps < 1:
-        raise FacesynthError(f"tcn needs at least one step of training; got {steps}")
-    optimiser = torch.optim.AdamW(model.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    rng, losses = np.random.default_rng(seed), []
-    model.train()
-    with torch.random.fork_rng(devices=[]):  # dropout draws from torch's own generator
-        torch.manual_seed(seed)
-        for _ in track(range(steps), "tcn: learning", steps):
-            loss = _loss(model, _batch(tracks, rng))
-            optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
-            optimiser.step()
-            schedule.step()
-            losses.append(float(loss.detach()))
-    return float(np.mean(losses[-max(1, steps // 10) :]))
-
-
-def _loss(model: nn.Sequential, batch: Tracks) -> Tensor:
-    """Mean squared error of the frames that were recorded."""
-    squared = (model(batch.heard.transpose(1, 2)).transpose(1, 2) - batch.moved).square().sum(dim=2)
-    return (squared * batch.present).sum() / batch.present.sum().clamp(min=1)
-
-
-def _batch(tracks: list[Tracks], rng: np.random.Generator) -> Tracks:
-    """BATCH windows [BATCH, WINDOW, ...] of utterances drawn in proportion to their length; short ones end in silence."""
-    lengths = np.array([len(track.heard) for track in tracks])
-    chosen = rng.choice(len(tracks), BATCH, p=lengths / lengths.sum())
-    starts = [int(rng.integers(max(lengths[i] - WINDOW, 0) + 1)) for i in chosen]
-    windows = [[_window(signal, start) for signal in tracks[i]] for i, start in zip(chosen, starts, strict=True)]
-    return Tracks(*(torch.stack(signals) for signals in zip(*windows, strict=True)))
-
-
-def _window(signal: Tensor, start: int) -> Tensor:
-    """WINDOW frames of [F, ...] from `start`, zeros after its end."""
-    piece = signal[start : start + WINDOW]
-    return torch.cat([piece, piece.new_zeros(WINDOW - len(piece), *piece.shape[1:])])
