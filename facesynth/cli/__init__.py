@@ -18,7 +18,7 @@ VERBS = {
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
     "emotion": ("facesynth.cli.emotion:emotion", "Hear the emotion in a voice."),
-    "tune": ("facesynth.cli.tune:tune", "Search eFASE's parameters on held-out sentences."),
+    "tune": ("facesynth.cli.tune:tune", "Search a method's settings on held-out sentences."),
     "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
     "export": ("facesynth.cli.export:export", "Write a model as ONNX graphs that run without torch."),
     "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),

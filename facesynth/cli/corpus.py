@@ -228,8 +228,9 @@ def align(folder: Path, ids: tuple[str, ...], force: bool, workers: Workers, as_
 def check(folder: Path, as_json: bool) -> None:
     """Say everything that is wrong with a corpus; exit code 2 where something grave is."""
     from facesynth.corpus.checks.check import check as check_corpus
+    from facesynth.methods.registry import needs
 
-    problems = check_corpus(folder)
+    problems = check_corpus(folder, needs())
     grave = sum(problem.grave for problem in problems)
     summary = f"{grave} problems, {len(problems) - grave} notes" if problems else "nothing is wrong"
     _show(as_json, {"problems": [asdict(problem) for problem in problems]}, [*map(str, problems), summary])

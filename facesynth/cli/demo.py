@@ -46,7 +46,7 @@ class Clock:
 @click.option("--size", default="1280x720", show_default=True, help="Of the video.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
-    """Build the synthetic performer, train eFASE on it and let it say a sentence that goes through three emotions.
+    """Build the synthetic performer, train a method on it and let it say a sentence that goes through three emotions.
 
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
@@ -60,7 +60,7 @@ def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
     corpus = build_performer("small", seed=seed)
     clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
     model, fresh = _trained(corpus, seed)
-    clock.step("train", f"eFASE with {len(model.facts['names'])} motion nodes")
+    clock.step("train", f"{model.name}: {model.capabilities.summary}")
     speech = _speech(seed)
     clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
     rig = load_head()
@@ -101,11 +101,12 @@ def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     """The model for this corpus, from the cache or made now, and whether it was made now."""
     from facesynth import __version__
     from facesynth.cache import cache_dir
-    from facesynth.methods.registry import create, load
+    from facesynth.methods.method import FORMAT
+    from facesynth.methods.registry import DEFAULT, create, load
 
-    model = create("efase")
-    made_of = json.dumps([__version__, model.config, corpus.provenance()["sha256"], seed])
-    path = cache_dir("models") / f"demo-efase-{sha256(made_of.encode()).hexdigest()[:16]}.safetensors"
+    model = create(DEFAULT)
+    made_of = json.dumps([__version__, FORMAT, model.config, corpus.provenance()["sha256"], seed])
+    path = cache_dir("models") / f"demo-{DEFAULT}-{sha256(made_of.encode()).hexdigest()[:16]}.safetensors"
     if path.exists():
         return load(path), False
     model.fit(corpus, seed=seed).save(path)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--from-predictions", "stored", type=click.Path(path_type=Path), help="Judge METHOD/ID.npz of this folder; train nothing."
 )
-@click.option("--no-references", is_flag=True, help="Leave out mean face, phone mean, ridge and tcn.")
+@click.option("--no-references", is_flag=True, help="Leave out the reference methods, such as the mean face.")
 @click.option("--show", "shown", multiple=True, metavar="ID", help="Utterances for trajectories and video.")
 @click.option("--no-video", is_flag=True, help="Leave out the videos.")
 @click.option("--title", default="", help="Of the report.")
@@ -63,8 +63,8 @@ def evaluate(
 ) -> None:
     """Train METHODS on a part of CORPUS, judge them on sentences that they did not see, and write a report.
 
-    A method is a name (efase) or a name with a settings file (efase:configs/efase_published.yaml). Interrupted, the same
-    command goes on where it was.
+    A method is a name or a name with a settings file (NAME:configs/NAME_published.yaml). Interrupted, the same command
+    goes on where it was.
     """
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers

@@ -5,24 +5,27 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 
 
 @click.command("tune")
 @click.argument("corpus", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("efase-tuned.yaml"), show_default=True)
-@click.option("--sentences", default=24, show_default=True, help="To tune on; none of them is in the database.")
+@click.option("--method", help="Whose settings; the one whose settings can be searched, where there is one.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Settings file; METHOD-tuned.yaml otherwise.")
+@click.option("--sentences", default=24, show_default=True, help="To tune on; none of them is learned from.")
 @click.option("--test", "test_sentences", default=12, show_default=True, help="To compare found and published settings on.")
 @click.option("--generations", default=10, show_default=True, help="Of 28 evaluations each, after the first.")
-@click.option("--limit", type=click.IntRange(min=2), help="At most so many utterances in the database, evenly chosen.")
+@click.option("--limit", type=click.IntRange(min=2), help="Learn from at most so many utterances, evenly chosen.")
 @click.option("--workers", default=2, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def tune(
     *,
     corpus: Path,
-    output: Path,
+    method: str | None,
+    output: Path | None,
     sentences: int,
     test_sentences: int,
     generations: int,
@@ -31,24 +34,40 @@ def tune(
     seed: int,
     as_json: bool,
 ) -> None:
-    """Search eFASE's settings on held-out sentences of CORPUS; interrupted, it goes on where it was."""
+    """Search a method's settings on held-out sentences of CORPUS; interrupted, it goes on where it was."""
     import yaml
 
     from facesynth.atomic import write_text
     from facesynth.corpus import Corpus
-    from facesynth.methods.efase.method import Efase
-    from facesynth.methods.efase.tuning import split_for_tuning
-    from facesynth.methods.efase.tuning import tune as search
 
-    database, tuning, test = split_for_tuning(Corpus.open(corpus), sentences, test_sentences, seed)
-    if limit and len(database) > limit:
-        database = database.subset([database.ids[i * len(database) // limit] for i in range(limit)])
-    model = Efase().fit(database, seed=seed)
-    journal = output.with_suffix(".jsonl")
-    found = search(model, tuning, test, journal=journal, generations=generations, seed=seed, workers=workers)
+    name, tuner = _tuner(method)
+    output = output or Path(f"{name}-tuned.yaml")
+    found = resolve_name(tuner)(
+        Corpus.open(corpus),
+        journal=output.with_suffix(".jsonl"),
+        sentences=sentences,
+        test_sentences=test_sentences,
+        generations=generations,
+        limit=limit,
+        seed=seed,
+        workers=workers,
+    )
     write_text(output, yaml.safe_dump({k: float(f"{v:.4g}") for k, v in found.settings.items()}, sort_keys=False))
     if as_json:
         click.echo(json.dumps(asdict(found)))
         return
     click.echo(f"{found.evaluations} evaluations on {sentences} sentences; {output} holds the settings")
     click.echo(f"on {test_sentences} other sentences: found {found.test_error:.4g}, published {found.published_test_error:.4g}")
+
+
+def _tuner(method: str | None) -> tuple[str, str]:
+    """Name of the method and of what searches its settings; FacesynthError where nothing does, or it must be chosen."""
+    from facesynth.inference.errors import FacesynthError
+    from facesynth.methods.registry import capabilities_of, known_capabilities
+
+    tunable = {one.name: one.tuner for one in known_capabilities()[0] if one.tuner}
+    if method is None and len(tunable) == 1:
+        return next(iter(tunable.items()))
+    if method is not None and capabilities_of(method).tuner:
+        return method, tunable[method]
+    raise FacesynthError(f"--method must be one whose settings can be searched: {', '.join(tunable)}; got {method}")

@@ -12,7 +12,7 @@ from filelock import FileLock, Timeout
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Contestant, Family, check_labels
+from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family, check_labels, references
 from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
@@ -177,7 +177,7 @@ def predicted_labels(predictions: Path, families: Sequence[Family] = ()) -> list
     labels = sorted(path.name for path in predictions.iterdir() if path.is_dir() and any(path.glob("*.npz")))
     if not [label for label in labels if label != SECOND_TAKE]:
         raise FacesynthError(f"{predictions} holds no predictions; wanted METHOD/UTTERANCE.npz in the documented form")
-    ordered = [label for family in families for label in family.labels] + list(REFERENCES)
+    ordered = [label for family in families for label in family.labels] + [one.label for one in references()]
     last = [label for label in dict.fromkeys(ordered) if label in labels]
     return [label for label in labels if label not in (SECOND_TAKE, *last)] + last
 

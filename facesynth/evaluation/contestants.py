@@ -14,13 +14,11 @@ from facesynth.config import load_config
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
-from facesynth.methods.registry import create, method_class
+from facesynth.methods.registry import create, known_capabilities, method_class
 from facesynth.methods.training import train
 
 SECOND_TAKE = "second take"
 """The label of the row that is a recording."""
-REFERENCES: Mapping[str, str] = {"mean face": "mean_face", "phone mean": "phone_mean", "ridge": "ridge", "tcn": "tcn"}
-"""Label and method of the rows without which no figure can be judged."""
 FAMILY_KEYS = ("title", "method", "include", "axis", "log", "curve", "variants")
 OWN_KEYS = ("minutes", "speak", "method")
 """Keys of a variant that are not settings of its method."""
@@ -80,8 +78,8 @@ class Family:
 
 
 def references() -> list[Contestant]:
-    """The rows that every table has beside the second take."""
-    return [Contestant(label, method) for label, method in REFERENCES.items()]
+    """The rows that every table has beside the second take, without which no figure can be judged."""
+    return [Contestant(one.reference, one.name) for one in known_capabilities()[0] if one.reference]
 
 
 def contestant(spec: str) -> Contestant:

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Protocol, Self, runtime_checkable
+from typing import Self
 
 import numpy as np
 
@@ -33,27 +33,11 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.capabilities import Joining, Reporting
 from facesynth.methods.method import Method
+from facesynth.methods.registry import ask
 
 SAMPLES = "samples"
-
-
-@runtime_checkable
-class Reporting(Protocol):
-    """A method with figures of its own, averaged into columns of their own."""
-
-    def report(self, speech: Speech) -> Mapping[str, float]:
-        """Figures (1) of what it makes of a speech."""
-        ...
-
-
-@runtime_checkable
-class Joining(Protocol):
-    """A method that joins pieces of recorded motion."""
-
-    def joins(self, speech: Speech) -> Sequence[int]:
-        """First frames of the pieces that it joins for a speech, without frame 0."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -72,8 +56,9 @@ class Beside:
     @classmethod
     def of(cls, method: Method, speech: Speech, spent: Spent) -> Self:
         """Ask a method."""
-        joins = tuple(map(int, method.joins(speech))) if isinstance(method, Joining) else None
-        own = {name: float(value) for name, value in method.report(speech).items()} if isinstance(method, Reporting) else {}
+        joining, reporting = ask(method, Joining), ask(method, Reporting)
+        joins = tuple(map(int, joining.joins(speech))) if joining else None
+        own = {name: float(value) for name, value in reporting.report(speech).items()} if reporting else {}
         return cls(spent.clock_s, speech.duration_s, joins, own, spent.processor_s)
 
 

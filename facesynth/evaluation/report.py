@@ -16,7 +16,7 @@ from facesynth.atomic import write_text
 from facesynth.corpus import Corpus
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
-from facesynth.evaluation.contestants import REFERENCES, SECOND_TAKE, Family
+from facesynth.evaluation.contestants import SECOND_TAKE, Family, references
 from facesynth.evaluation.curve import LIVELY, MEASURES, Curve, Measure, Point
 from facesynth.evaluation.curve_figure import curve_figure
 from facesynth.evaluation.details import Details
@@ -120,7 +120,7 @@ def pictured_rows(comparison: Comparison, families: Sequence[Family]) -> list[st
     variants = {label for family in families for label in family.labels}
     rows = [row.label for row in comparison.rows]
     named = [label for label in rows if label not in variants]
-    if set(named) - {SECOND_TAKE, *REFERENCES}:
+    if set(named) - {SECOND_TAKE, *(one.label for one in references())}:
         return named
     firsts = {family.labels[0] for family in families}
     return [label for label in rows if label in firsts or label not in variants]
@@ -155,7 +155,7 @@ def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: 
     Variants of a family that is no single method are left out: they have a picture of their own.
     """
     curves = [curve for curve in result.curves(families) if curve.label in colours]
-    references = (*REFERENCES, SECOND_TAKE)
+    known = (*(one.label for one in references()), SECOND_TAKE)
     rows = [
         (
             curve.label,
@@ -163,7 +163,7 @@ def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: 
         )
         for curve in curves
     ]
-    return {"trade": curve_figure(curves, references, unit, colours) if curves else "", "curves": rows, "lively": LIVELY}
+    return {"trade": curve_figure(curves, known, unit, colours) if curves else "", "curves": rows, "lively": LIVELY}
 
 
 def _best(curve: Curve, point: Point | None, measure: Measure) -> tuple[str, str]:

@@ -22,12 +22,23 @@ from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.capabilities import Capabilities
 
-FORMAT = 1
+FORMAT = 2
 """Version of the model file; a file of another version is refused."""
 
 _FITTING: dict[type, tuple[type, ...]] = {float: (float, int), int: (int,), bool: (bool,), str: (str,)}
-_HEADER = ("method", "config", "layout", "fps", "emotions", "facts", "provenance")
+_HEADER: dict[str, type | tuple[type, ...]] = {
+    "method": str,
+    "config": dict,
+    "layout": dict,
+    "fps": (float, int),
+    "emotions": list,
+    "facts": dict,
+    "provenance": dict,
+    "tensors": dict,
+}
+"""What the header of a model file holds, and of what kind."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +59,7 @@ class Method(nn.Module):
     """
 
     name: ClassVar[str]
+    capabilities: ClassVar[Capabilities]
     config: dict[str, Any]
     """Every argument of the constructor, those left out at their defaults."""
 
@@ -118,6 +130,7 @@ class Method(nn.Module):
 
     def save(self, path: str | Path) -> None:
         """Write one safetensors file, atomically; config, layout and provenance are its metadata."""
+        tensors = {key: value.detach().cpu().contiguous() for key, value in self.state_dict().items()}
         header = {
             "method": self.name,
             "config": self.config,
@@ -126,10 +139,10 @@ class Method(nn.Module):
             "emotions": list(self.emotions),
             "facts": self.facts,
             "provenance": self.provenance,
+            "tensors": {key: list(value.shape) for key, value in tensors.items()},
             "facesynth": __version__,
             "format": FORMAT,
         }
-        tensors = {key: value.detach().cpu().contiguous() for key, value in self.state_dict().items()}
         with atomic_path(path) as part:
             try:
                 save_file(tensors, part, metadata={"facesynth": json.dumps(header, sort_keys=True)})
@@ -146,10 +159,12 @@ class Method(nn.Module):
         method.layout = Layout.from_dict(header["layout"])
         method.fps, method.emotions = float(header["fps"]), tuple(header["emotions"])
         method.facts, method.provenance = header["facts"], header["provenance"]
-        with safe_open(path, "pt") as file:
-            for key in file.keys():  # noqa: SIM118 - safe_open is no mapping
-                owner, _, leaf = key.rpartition(".")
-                _set_buffer(method.get_submodule(owner), leaf, file.get_tensor(key))
+        modules = dict(method.named_modules())
+        for key, tensor in _read_tensors(path, header["tensors"]).items():
+            owner, _, leaf = key.rpartition(".")
+            if owner not in modules:
+                raise FacesynthError(f"{path} was written by another version of {cls.name}, which had a {owner}; train it again")
+            _set_buffer(modules[owner], leaf, tensor)
         return method.eval()
 
 
@@ -165,14 +180,29 @@ def read_header(path: str | Path) -> dict[str, Any]:
     if text is None:
         raise FacesynthError(f"{path} is a safetensors file without a facesynth header; it was not written by facesynth")
     try:
-        header: dict[str, Any] = json.loads(text)
+        header = json.loads(text)
     except ValueError:
         raise FacesynthError(f"{path} has a damaged facesynth header; train the model again") from None
+    if not isinstance(header, dict):
+        raise FacesynthError(f"{path} has a damaged facesynth header; train the model again")
     if header.get("format") != FORMAT:
         raise FacesynthError(f"{path} has model format {header.get('format')}; this facesynth reads {FORMAT}: train it again")
-    if missing := [key for key in _HEADER if key not in header]:
-        raise FacesynthError(f"{path} has a damaged facesynth header without {', '.join(missing)}; train the model again")
+    if wrong := [key for key, kind in _HEADER.items() if not isinstance(header.get(key), kind)]:
+        raise FacesynthError(f"{path} has a damaged facesynth header without {', '.join(wrong)}; train the model again")
     return header
+
+
+def _read_tensors(path: str | Path, stated: Mapping[str, Any]) -> dict[str, torch.Tensor]:
+    """The tensors of a model file, which must be those that its header states, in name and shape."""
+    with safe_open(path, "pt") as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
+    found = {key: list(tensor.shape) for key, tensor in tensors.items()}
+    for key in sorted({*stated, *found}):
+        if found.get(key) != stated.get(key):
+            raise FacesynthError(
+                f"{path} is damaged: {key} has the shape {found.get(key)}, the header says {stated.get(key)}; train it again"
+            )
+    return tensors
 
 
 def _set_buffer(module: nn.Module, name: str, value: torch.Tensor) -> None:

@@ -1,49 +1,125 @@
-"""Which methods exist, and how to make, save and load one by name."""
+"""Which methods exist, what they can do, and how to make, save and load one by name.
+
+Methods of other packages are found by entry points of the group `facesynth.methods`, each of which names an object of the
+type `Capabilities`. Listing names imports none of them; asking what they can do imports what the entry point names.
+"""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.methods.method import Method, read_header
+from facesynth.methods.capabilities import WORDS, Capabilities
 
-_MODULES = {
-    "efase": "facesynth.methods.efase.method",
-    "anime_graph": "facesynth.methods.anime_graph.method",
-    "lds": "facesynth.methods.lds.method",
-    "mean_face": "facesynth.methods.baselines.mean_face",
-    "phone_mean": "facesynth.methods.baselines.phone_mean",
-    "ridge": "facesynth.methods.baselines.ridge",
-    "tcn": "facesynth.methods.baselines.tcn",
+if TYPE_CHECKING:
+    from facesynth.corpus.checks.needs import Need
+    from facesynth.methods.method import Method
+
+GROUP = "facesynth.methods"
+_BUILT_IN = {
+    name: EntryPoint(name, f"facesynth.methods.{value}", GROUP)
+    for name, value in {
+        "mean_face": "baselines.capabilities:MEAN_FACE",
+        "phone_mean": "baselines.capabilities:PHONE_MEAN",
+        "ridge": "baselines.capabilities:RIDGE",
+        "lds": "lds.capabilities:CAPABILITIES",
+        "tcn": "baselines.capabilities:TCN",
+        "anime_graph": "anime_graph.capabilities:CAPABILITIES",
+        "efase": "efase.capabilities:CAPABILITIES",
+    }.items()
 }
+DEFAULT = "efase"
+"""The method of those who do not choose one."""
 _CLASSES: dict[str, type[Method]] = {}
 
+A = TypeVar("A")
+M = TypeVar("M", bound="Method")
 
-def register(name: str) -> Callable[[type[Method]], type[Method]]:
-    """Class decorator: make a method known under `name`."""
 
-    def add(cls: type[Method]) -> type[Method]:
-        cls.name = name
-        _CLASSES[name] = cls
+def register(capabilities: Capabilities) -> Callable[[type[M]], type[M]]:
+    """Class decorator: make a method known by what it can do."""
+
+    def add(cls: type[M]) -> type[M]:
+        cls.name, cls.capabilities = capabilities.name, capabilities
+        _CLASSES[capabilities.name] = cls
         return cls
 
     return add
 
 
 def list_methods() -> list[str]:
-    """Names that `create` knows."""
-    return sorted({*_MODULES, *_CLASSES})
+    """Names that `create` knows; nothing is imported for it."""
+    return sorted({*_entries(), *_CLASSES})
+
+
+def capabilities_of(name: str) -> Capabilities:
+    """What a method can do; FacesynthError with the nearest names where there is none, or where its package is broken."""
+    if name in _CLASSES:
+        return _CLASSES[name].capabilities
+    entries = _entries()
+    if name not in entries:
+        raise unknown("method", name, list_methods())
+    stated = _of_package(entries[name], entries[name].load)
+    if not isinstance(stated, Capabilities) or stated.name != name:
+        raise FacesynthError(f"{_said_by(entries[name])} must name the Capabilities of {name}; got {stated!r:.80}")
+    return stated
+
+
+def known_capabilities() -> tuple[list[Capabilities], list[str]]:
+    """Of all methods, in the order of what they need to learn from; and a line for each that cannot say."""
+    known, broken = [], []
+    for name in [*_BUILT_IN, *(name for name in list_methods() if name not in _BUILT_IN)]:
+        try:
+            known.append(capabilities_of(name))
+        except FacesynthError as error:
+            broken.append(str(error))
+    return sorted(known, key=lambda one: one.minutes), broken
+
+
+def needs() -> list[Need]:
+    """What the methods need to learn from, for the check of a corpus."""
+    from facesynth.corpus.checks.needs import Need
+
+    return [Need(one.name, one.minutes, one.of_each_phone) for one in known_capabilities()[0] if one.minutes]
+
+
+def able(ability: type) -> list[str]:
+    """Names of the methods that have an ability."""
+    return [one.name for one in known_capabilities()[0] if ability in one.abilities]
+
+
+def ask(method: Method, ability: type[A]) -> A | None:
+    """The method as one that has an ability; None where it has not."""
+    return method if isinstance(method, ability) else None
+
+
+def require(method: Method, ability: type[A]) -> A:
+    """The same; FacesynthError, naming methods that have it, where it has not."""
+    if (found := ask(method, ability)) is None:
+        without, others = WORDS[ability]
+        raise FacesynthError(f"{method.name} {without}; {_joined(able(ability))} {others}")
+    return found
+
+
+def require_option(method: Method, name: str) -> None:
+    """FacesynthError, naming methods that have it, for an option of `speak` that a method has not."""
+    if method.capabilities.option(name) is None:
+        having = [one for one in known_capabilities()[0] if one.option(name)]
+        flag = next((option.flag for one in having if (option := one.option(name))), f"--{name}")
+        raise FacesynthError(f"{method.name} has no option {flag}; it is one of {_joined(one.name for one in having)}")
 
 
 def method_class(name: str) -> type[Method]:
     """The class behind a name; FacesynthError with the nearest names where there is none."""
-    if name not in _CLASSES and name in _MODULES:
-        importlib.import_module(_MODULES[name])
     if name not in _CLASSES:
-        raise unknown("method", name, list_methods())
+        home = capabilities_of(name).home
+        _of_package(_entries()[name], lambda: importlib.import_module(home))
+        if name not in _CLASSES:
+            raise FacesynthError(f"{home} registers no method {name!r}, though {_said_by(_entries()[name])} says so")
     return _CLASSES[name]
 
 
@@ -54,8 +130,31 @@ def create(name: str, **config: Any) -> Method:
 
 def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
-    header = read_header(path)
+    from facesynth.methods.method import read_header
+
+    return method_class(read_header(path)["method"]).load(path)
+
+
+def _entries() -> Mapping[str, EntryPoint]:
+    """Of other packages and our own; a name of ours cannot be taken over."""
+    return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **_BUILT_IN}
+
+
+def _of_package(entry: EntryPoint, import_it: Callable[[], A]) -> A:
+    """What an import gives; whatever goes wrong in another package is told in one line and does not break the others."""
+    if entry.name in _BUILT_IN:
+        return import_it()
     try:
-        return method_class(header["method"]).load(path)
-    except (KeyError, IndexError, AttributeError, TypeError, RuntimeError) as error:
-        raise FacesynthError(f"{path} is damaged, or another version wrote it ({error!r}); train it again") from error
+        return import_it()
+    except Exception as error:  # foreign code may raise anything; it is told, with the package to repair
+        raise FacesynthError(f"{_said_by(entry)} cannot be imported ({error!r}); repair or remove it") from error
+
+
+def _said_by(entry: EntryPoint) -> str:
+    package = f" of the package {entry.dist.name}" if entry.dist else ""
+    return f"the entry point {entry.name} = {entry.value}{package}"
+
+
+def _joined(names: Iterable[str]) -> str:
+    names = list(names)
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "no method"

@@ -10,6 +10,7 @@ from facesynth.corpus.checks.check import check as check_all
 from facesynth.corpus.record import write_records
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
+from facesynth.methods.registry import needs
 from facesynth.speech.audio import save_wav
 
 ID = "s00_happy_t1"
@@ -27,7 +28,8 @@ def corpus(shared, tmp_path):
 
 def check(corpus):
     """What is wrong, without what a dozen utterances are too few for."""
-    return [problem for problem in check_all(corpus) if "too few" not in problem.what and "little for" not in problem.what]
+    found = check_all(corpus, needs())
+    return [problem for problem in found if "too few" not in problem.what and "little for" not in problem.what]
 
 
 def found(corpus, file: str = "") -> str:
@@ -259,7 +261,7 @@ def test_a_copy_that_is_not_the_same_to_the_byte_is_found(corpus):
 
 
 def test_too_little_is_told_by_method_with_what_to_do(shared):
-    told = [problem for problem in check_all(shared) if problem not in check(shared)]
+    told = [problem for problem in check_all(shared, needs()) if problem not in check(shared)]
     text = "\n".join(map(str, told))
     assert not any(problem.grave for problem in told)
     assert "minutes are little for ridge (1), lds (1), tcn (3), anime_graph (3), efase (5)" in text

@@ -18,6 +18,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
+from facesynth.methods.capabilities import Capabilities
 from facesynth.methods.registry import register
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
@@ -25,7 +26,7 @@ COSTS = ("train_s", "train_cpu_s", "train_minutes", "rtf", "rtf_cpu", "peak_mb",
 CLOCKS = ("train_s", "train_cpu_s", "rtf", "rtf_cpu", "peak_mb")
 
 
-@register("telling")
+@register(Capabilities("telling"))
 class Telling(PhoneMean):
     """Phone mean that tells something of itself, as a concatenative method would."""
 
@@ -36,7 +37,7 @@ class Telling(PhoneMean):
         return speech.phones.frame_bounds(self.fps)[1:-1]
 
 
-@register("drawing")
+@register(Capabilities("drawing"))
 class Drawing(MeanFace):
     """A method that draws where it holds the face: the first channel lies off by a normal number of 2 units."""
 
@@ -47,7 +48,7 @@ class Drawing(MeanFace):
         return Motion(frames, motion.fps, motion.layout)
 
 
-@register("short")
+@register(Capabilities("short"))
 class Short(MeanFace):
     """A method that forgets the last frame."""
 

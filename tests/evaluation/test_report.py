@@ -23,6 +23,7 @@ from facesynth.face.draw.video import read_video
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
+from facesynth.methods.capabilities import Capabilities
 from facesynth.methods.registry import register
 
 FILES = (
@@ -33,7 +34,7 @@ FAMILY = Family("By minutes", ("phone mean", "little"), "minutes", (9.0, 0.05))
 CURVE = Family("By what it holds", ("mean face", "wrong"), curve="still faces")
 
 
-@register("wrong_face")
+@register(Capabilities("wrong_face"))
 class WrongFace(MeanFace):
     """A face that is held wrongly and shakes."""
 
@@ -43,7 +44,7 @@ class WrongFace(MeanFace):
         return Motion(motion.frames + shaking, motion.fps, motion.layout)
 
 
-@register("knowing")
+@register(Capabilities("knowing"))
 class Knowing(MeanFace):
     """A method that tells what it learned."""
 

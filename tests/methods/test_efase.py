@@ -305,7 +305,7 @@ def test_model_files_that_are_none(model, tmp_path):
         path.write_bytes(content)
         with pytest.raises(FacesynthError, match=message):
             load(path)
-    path.write_bytes(whole.replace(b'\\"format\\": 1', b'\\"format\\": 9'))
+    path.write_bytes(whole.replace(b'\\"format\\": 2', b'\\"format\\": 9'))
     with pytest.raises(FacesynthError, match="format 9"):
         load(path)
     with pytest.raises(FacesynthError, match="no such model"):

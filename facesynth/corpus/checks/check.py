@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from facesynth.corpus.checks import needs, sync, whole
@@ -24,11 +25,11 @@ LONGEST_DIFFERENCE_S = 0.1
 """Sound, phones and motion of one recording may differ by this much in length."""
 
 
-def check(corpus: Corpus | str | Path) -> list[Problem]:
+def check(corpus: Corpus | str | Path, methods: Sequence[needs.Need] = ()) -> list[Problem]:
     """Everything that is wrong with a corpus, grave things first, each with what to do about it.
 
     A path is enough, for a corpus may be too damaged to open; a folder without corpus.yaml is a FacesynthError. What is
-    marked unusable may be wrong.
+    marked unusable may be wrong. methods: what the methods need that are to learn from it.
     """
     files = Files(corpus.path if isinstance(corpus, Corpus) else Path(corpus))
     if not files.header.is_file():
@@ -48,7 +49,7 @@ def check(corpus: Corpus | str | Path) -> list[Problem]:
     if not header.synthetic:  # computed voices repeat themselves
         problems += whole.nearly_duplicates(files, records.values())
     problems += sync.sync_problems(files, header, records.values())
-    problems += needs.lacking(files, records.values())
+    problems += needs.lacking(files, records.values(), methods)
     problems += whole.sentences(records.values())
     problems += whole.strays(files, records)
     problems += whole.rights(header, records.values())

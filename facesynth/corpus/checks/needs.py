@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import product
 
 from facesynth.corpus.checks.problem import Problem
 from facesynth.corpus.files import Files
@@ -13,17 +15,24 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES, SILENCE
 from facesynth.speech.textgrid import read_textgrid
 
-MINUTES = {"ridge": 1.0, "lds": 1.0, "tcn": 3.0, "anime_graph": 3.0, "efase": 5.0}
-"""Rules of thumb: minutes of speech that a method should have."""
-FEWEST_OF_A_PHONE = 5
-"""Recordings of one phone in one emotion under which a search has no choice."""
 FEWEST_OF_AN_EMOTION = 10
 """Recordings of an emotion that its recognition must have heard."""
 RARE = frozenset({SILENCE, "ax", "el", "em", "en", "zh"})
 
 
-def lacking(files: Files, records: Iterable[Record]) -> Iterator[Problem]:
-    """Notes on methods for which there is too little to learn from."""
+@dataclass(frozen=True)
+class Need:
+    """What a method should have to learn from; rules of thumb."""
+
+    method: str
+    minutes: float
+    """Of speech."""
+    of_each_phone: int = 0
+    """Recordings of each phone in each emotion."""
+
+
+def lacking(files: Files, records: Iterable[Record], needs: Sequence[Need]) -> Iterator[Problem]:
+    """Notes on methods for which there is too little to learn from, and on emotions that are too rare."""
     minutes, counts, takes = 0.0, defaultdict[str, Counter[str]](Counter), Counter[str]()
     for record in records:
         if not record.usable:
@@ -35,14 +44,14 @@ def lacking(files: Files, records: Iterable[Record]) -> Iterator[Problem]:
             takes[record.emotion] += 1
     if not takes:
         return
-    short = [f"{method} ({wanted:g})" for method, wanted in MINUTES.items() if minutes < wanted]
+    short = [f"{need.method} ({need.minutes:g})" for need in needs if minutes < need.minutes]
     if short:
         do = "record more; `facesynth corpus stats` says which sentences would add most"
         yield Problem("utterances.csv", f"{minutes:.1f} minutes are little for {', '.join(short)}", do, grave=False)
-    for emotion, heard in counts.items():
-        few = [phone for phone in PHONES if phone not in RARE and heard[phone] < FEWEST_OF_A_PHONE]
+    for need, (emotion, heard) in product(needs, counts.items()):
+        few = [phone for phone in PHONES if phone not in RARE and heard[phone] < need.of_each_phone]
         if few:
-            what = f"{emotion}: too few for efase (under {FEWEST_OF_A_PHONE} times) are the phones {' '.join(few)}"
+            what = f"{emotion}: too few for {need.method} (under {need.of_each_phone} times) are the phones {' '.join(few)}"
             yield Problem("phones", what, "record sentences with them (`facesynth corpus stats`)", grave=False)
     scarce = [f"{emotion} ({count})" for emotion, count in takes.items() if count < FEWEST_OF_AN_EMOTION]
     if len(takes) > 1 and scarce:

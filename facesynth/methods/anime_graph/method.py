@@ -19,6 +19,7 @@ from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import Speech
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
+from facesynth.methods.anime_graph.capabilities import CAPABILITIES
 from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at, keep_shut, narrowest_gaps
 from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
@@ -41,6 +42,7 @@ from facesynth.methods.anime_graph.search import Weights
 from facesynth.methods.anime_graph.soft import mean_motion
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import FaceStream, Stream
+from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.sharpening import sharpen
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.method import Method
@@ -56,7 +58,7 @@ EMOTION_CHANGES_S = 0.08
 """Standard deviation of the smoothing with which mapped emotions come and go."""
 
 
-@register("anime_graph")
+@register(CAPABILITIES)
 class AnimeGraph(Method):
     """Recorded phones, found by sound and joined by example; emotions mapped between recordings (Cao 2005).
 
@@ -338,6 +340,15 @@ class AnimeGraph(Method):
             "other_visemes": float((VISEMES[said] != VISEMES[phones]).mean()),
             "other_emotions": float((felt != feelings).mean()),
         }
+
+    def account(self, speech: Speech, *, look_ahead: int | None = None) -> Account:
+        """What the graph lacked, and what a look-ahead lost; see `Plan.summary`."""
+        found = self.plan(speech, look_ahead=look_ahead).summary()
+        fallbacks = [item for what in ("phone_fallbacks", "emotion_fallbacks") for item in found[what].items()]
+        lacking = f"of {found['phones']} phones are not in the graph as asked for"
+        warnings = [f"{count} {lacking}: {level}" for level, count in fallbacks]
+        lost = f"look-ahead of {look_ahead} phones: {found['extra_cost']:.2%} over the least cost"
+        return Account(found, warnings, [] if look_ahead is None else [lost])
 
     def joins(self, speech: Speech) -> NDArray[np.int64]:
         """First frames of the phones that were jumped to."""

@@ -11,12 +11,13 @@ from torch import Tensor
 from facesynth.corpus import Corpus
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.baselines.capabilities import MEAN_FACE
 from facesynth.methods.learn.frames import mean_pose, refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
 
-@register("mean_face")
+@register(MEAN_FACE)
 class MeanFace(Method):
     """Every frame is the mean of all recorded frames; missing samples do not count."""
 

@@ -14,6 +14,7 @@ from torch import Tensor
 from facesynth.corpus import Corpus
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.methods.baselines.capabilities import PHONE_MEAN
 from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
@@ -25,7 +26,7 @@ HOLD_S = 0.15
 """The pose of a long phone, a pause above all, is reached this long after its start and left as long before its end, s."""
 
 
-@register("phone_mean")
+@register(PHONE_MEAN)
 class PhoneMean(Method):
     """Each phone's mean pose, in each emotion in which it was recorded, joined smoothly from middle to middle.
 

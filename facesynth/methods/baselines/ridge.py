@@ -14,6 +14,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.baselines.capabilities import RIDGE
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.method import Method
@@ -29,7 +30,7 @@ HELD_OUT_SHARE = 0.2
 """Share of the sentences that choose the penalty."""
 
 
-@register("ridge")
+@register(RIDGE)
 class Ridge(Method):
     """Linear regression from 40 log-mel bands at 21 times over ±200 ms to 25 principal components of the motion.
 

@@ -13,6 +13,7 @@ from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.baselines.capabilities import TCN
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
@@ -21,7 +22,7 @@ from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
 
 
-@register("tcn")
+@register(TCN)
 class Tcn(Method):
     """Four 1-D convolutions, 128 wide, kernel 5, dilation up to 2, dropout 0.3, from log-mel bands to 25 components.
 

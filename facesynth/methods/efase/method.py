@@ -15,7 +15,9 @@ from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
 from facesynth.inference.speech import Speech
+from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.audio import AudioTerms, Expected
+from facesynth.methods.efase.capabilities import CAPABILITIES
 from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
 from facesynth.methods.efase.costs import Query, Weights, target_costs
@@ -42,7 +44,7 @@ LIP_PHONES = BILABIALS | LABIODENTALS
 """Never said by another viseme class while their own has a node: everybody sees lips that do not close."""
 
 
-@register("efase")
+@register(CAPABILITIES)
 class Efase(Method):
     """Constrained dynamic programming over captured motion nodes (Deng & Neumann 2008).
 
@@ -252,6 +254,10 @@ class Efase(Method):
         """Shares of phones said by another phone, viseme class or emotion."""
         plan = self.plan(speech, constraints=constraints)
         return shares(self.nodes(), plan.query, plan.nodes)
+
+    def account(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> Account:
+        """The shares of `report`."""
+        return Account(self.report(speech, constraints=constraints))
 
     def joins(self, speech: Speech) -> np.ndarray:
         """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""

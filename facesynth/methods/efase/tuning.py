@@ -124,6 +124,25 @@ def tune(
     )
 
 
+def tuned(
+    corpus: Corpus,
+    *,
+    journal: Path,
+    sentences: int,
+    test_sentences: int,
+    generations: int,
+    limit: int | None = None,
+    seed: int = 0,
+    workers: int = 1,
+) -> Tuning:
+    """`tune` on held-out sentences of a corpus; the database is all others, or `limit` utterances, evenly chosen."""
+    database, tuning, test = split_for_tuning(corpus, sentences, test_sentences, seed)
+    if limit and len(database) > limit:
+        database = database.subset([database.ids[i * len(database) // limit] for i in range(limit)])
+    model = Efase().fit(database, seed=seed)
+    return tune(model, tuning, test, journal=journal, generations=generations, seed=seed, workers=workers)
+
+
 def examples_of(model: Efase, corpus: Corpus) -> list[Example]:
     """The utterances of a corpus, ready to be compared with."""
     fps = model.config["database_fps"]

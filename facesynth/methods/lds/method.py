@@ -12,6 +12,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.methods.lds.capabilities import CAPABILITIES
 from facesynth.methods.lds.features import Standardised
 from facesynth.methods.lds.identification import fitting_rows, identify
 from facesynth.methods.lds.innovations import Innovations, innovations_of
@@ -27,7 +28,7 @@ SETTLING_S = 4.0
 """How long the noise runs before the first frame, so that it starts as it goes on."""
 
 
-@register("lds")
+@register(CAPABILITIES)
 class LDS(Method):
     """Speech-driven linear dynamical system with non-Gaussian noise (Saisan 2004).
 

@@ -1,0 +1,17 @@
+"""What the reference methods can do."""
+
+from __future__ import annotations
+
+from facesynth.methods.capabilities import Capabilities
+
+HOME = "facesynth.methods.baselines"
+MEAN_FACE = Capabilities(
+    "mean_face", "the mean of what was recorded", home=f"{HOME}.mean_face", hears_phones=False, reference="mean face"
+)
+PHONE_MEAN = Capabilities("phone_mean", "one pose for each phone", home=f"{HOME}.phone_mean", reference="phone mean")
+RIDGE = Capabilities(
+    "ridge", "a linear map from sound to motion", home=f"{HOME}.ridge", hears_phones=False, minutes=1.0, reference="ridge"
+)
+TCN = Capabilities(
+    "tcn", "a small temporal convolution network", home=f"{HOME}.tcn", hears_phones=False, minutes=3.0, reference="tcn"
+)

@@ -1,0 +1,141 @@
+"""What a method can do, stated apart from what does it, so that one may ask without importing torch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    from facesynth.inference.motion import Motion
+    from facesynth.inference.speech import Speech
+
+OptionType = type[bool] | type[int] | type[float] | type[str] | type[Path]
+
+
+@dataclass(frozen=True)
+class Option:
+    """A keyword of a method's own in `synthesize`; `look_ahead` is --look-ahead on the command line."""
+
+    name: str
+    type: OptionType
+    """What it is given as; a Path is a file, which `reader` reads."""
+    help: str
+    least: float | None = None
+    most: float | None = None
+    reader: str = ""
+    """`module:function` that makes the value of a file and of the phones that are spoken: (Path, PhoneTrack) -> value."""
+
+    @property
+    def flag(self) -> str:
+        """As it is written on the command line."""
+        return "--" + self.name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class Account:
+    """What a method says of the motion that it found."""
+
+    facts: Mapping[str, Any]
+    """As JSON can hold it."""
+    warnings: Sequence[str] = ()
+    remarks: Sequence[str] = ()
+
+
+@runtime_checkable
+class Explaining(Protocol):
+    """Tells why it chose what."""
+
+    def explain(self, speech: Speech, **options: Any) -> list[dict[str, Any]]:
+        """One entry for each phone, as JSON can hold it."""
+        ...
+
+
+@runtime_checkable
+class Accounting(Protocol):
+    """Tells how well its search went."""
+
+    def account(self, speech: Speech, **options: Any) -> Account:
+        """Of the motion for a speech."""
+        ...
+
+
+@runtime_checkable
+class Reporting(Protocol):
+    """Has figures of its own, averaged into columns of their own."""
+
+    def report(self, speech: Speech) -> Mapping[str, float]:
+        """Figures (1) of what it makes of a speech."""
+        ...
+
+
+@runtime_checkable
+class Joining(Protocol):
+    """Joins pieces of recorded motion."""
+
+    def joins(self, speech: Speech) -> Sequence[int]:
+        """First frames of the pieces that it joins for a speech, without frame 0."""
+        ...
+
+
+@runtime_checkable
+class MappingEmotions(Protocol):
+    """Maps any motion of its layout, its own or another method's, to another emotion."""
+
+    def map_along(self, motion: Motion, speech: Speech, target: str, *, intensity: float = 1.0) -> Motion:
+        """From the speech's emotions to the target; an intensity of 0 leaves the motion as it is."""
+        ...
+
+
+@runtime_checkable
+class Streaming(Protocol):
+    """Makes motion while the phones arrive."""
+
+    def open_stream(self, *, look_ahead: int) -> Any:
+        """Something to push phones into and take frames from."""
+        ...
+
+
+WORDS: Mapping[type, tuple[str, str]] = {
+    Explaining: ("tells nothing of its choices", "explain them"),
+    Accounting: ("gives no account of its search", "give one"),
+    Reporting: ("has no figures of its own", "have some"),
+    Joining: ("joins no pieces", "join them"),
+    MappingEmotions: ("learns no emotion maps", "learn them"),
+    Streaming: ("makes no motion while the phones arrive", "do"),
+}
+"""What a method without an ability does not do, and what those with it do."""
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """A method's entry: its name, what it can do, and where its code is."""
+
+    name: str
+    summary: str = ""
+    """One line, for those who choose."""
+    home: str = ""
+    """The module that registers the class when it is imported; empty for a class that registered itself already."""
+    options: tuple[Option, ...] = ()
+    """Its own options of `speak`."""
+    abilities: frozenset[type] = field(default_factory=frozenset)
+    """Of the protocols above."""
+    layouts: tuple[str, ...] = ("markers", "landmarks", "curves")
+    """Kinds of motion that it learns."""
+    hears_phones: bool = True
+    """Whether what is said counts, and not the sound alone."""
+    minutes: float = 0.0
+    """Of speech that it should have to learn from; a rule of thumb."""
+    of_each_phone: int = 0
+    """So many recordings of each phone in each emotion it should have."""
+    reference: str = ""
+    """Label of the row that every table of an evaluation has for it; empty for a method that is compared when asked."""
+    exporter: str = ""
+    """`module:function` that turns a trained model into what runs without torch."""
+    tuner: str = ""
+    """`module:function` that searches its settings on sentences held out."""
+
+    def option(self, name: str) -> Option | None:
+        """Its own option of this name."""
+        return next((option for option in self.options if option.name == name), None)

@@ -1,0 +1,26 @@
+"""What eFASE can do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from facesynth.methods.capabilities import Accounting, Capabilities, Explaining, Joining, Option, Reporting
+
+CAPABILITIES = Capabilities(
+    "efase",
+    "the cheapest path through recorded motion nodes, one for each phone (Deng & Neumann 2008)",
+    home="facesynth.methods.efase.method",
+    options=(
+        Option(
+            "constraints",
+            Path,
+            "CSV of nodes that must be used: phone_index or time_s, utterance_id, phone_number.",
+            reader="facesynth.methods.efase.constraints:read_constraints",
+        ),
+    ),
+    abilities=frozenset({Explaining, Accounting, Reporting, Joining}),
+    minutes=5.0,
+    of_each_phone=5,
+    exporter="facesynth.export.efase:efase_content",
+    tuner="facesynth.methods.efase.tuning:tuned",
+)
