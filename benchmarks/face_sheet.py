@@ -80,7 +80,7 @@ def sheet(
 def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     rig = load_head()
-    renderer = Renderer(rig)
+    renderer = Renderer.of(rig)
 
     def shot(shapes: dict[str, float], turn: list[float]) -> np.ndarray:
         return renderer.render(pose(rig, weights_of(rig, shapes), [*turn, 0, 0, 0], tongue_up=shapes.get("tongue", 0)))

@@ -34,11 +34,11 @@ def seconds(work: Callable[[], object], times: int = 5) -> float:
 def main(frames: int) -> None:
     start = time.perf_counter()
     rig = load_head()
-    renderer = Renderer(rig, SIZE)
+    renderer = Renderer.of(rig, SIZE)
     renderer.render(rig.rest_mm)
     print(f"from nothing to the first picture: {time.perf_counter() - start:.1f} s (compiles and bakes once per installation)")
 
-    baked = renderer._baked
+    baked = renderer.look
     position = baked.refine @ rig.rest_mm
     normal = vertex_normals(position, baked.surface.quads)
     screen = renderer.camera.project(position, SIZE)

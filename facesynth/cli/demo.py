@@ -82,16 +82,15 @@ def _strip(path: Path, performance: Performance, rig: Rig) -> Path:
 
     from facesynth.atomic import atomic_path
     from facesynth.face.draw.render import Renderer
-    from facesynth.stage.performance import picture
 
     animation, track = performance.animation, performance.speech.emotions
-    renderer = Renderer(rig, (480, 540))
+    renderer = Renderer.of(rig, (480, 540))
     starts = np.concatenate([[0.0], track.ends_s[:-1]])
     pictures = []
     for start, end in zip(starts, track.ends_s, strict=True):
         inner = slice(int((0.35 * end + 0.65 * start) * animation.fps), int((0.75 * end + 0.25 * start) * animation.fps))
         k = inner.start + int(animation.weight("jawOpen")[inner].argmax())
-        pictures.append(picture(animation, k, rig, renderer))
+        pictures.append(renderer.render(rig.vertices(animation, k)))
     with atomic_path(path) as part:
         Image.fromarray(np.hstack(pictures)).save(part, format="PNG")
     return path

@@ -191,7 +191,7 @@ def _speak_one(method: Method, path: Path, targets: list[Path], size: tuple[int,
         write_text(options["explain"], json.dumps(_explaining(method).explain(heard.speech, **settings), indent=1))
         written.append(str(options["explain"]))
     for target in targets:
-        write_performance(target, performance, rig, size, own)
+        write_performance(target, performance, own or rig, size)
         click.echo(f"{target}: {heard.speech.duration_s:.2f} s at {float(options['fps']):.5g} fps", err=True)
     written += [str(target) for target in targets]
     grid = targets[0].with_suffix(".TextGrid")

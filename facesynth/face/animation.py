@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,12 @@ from facesynth.inference.errors import FacesynthError
 
 @dataclass(frozen=True, eq=False)
 class FaceAnimation:
-    """T frames of a rigged face; all arrays are kept as float32."""
+    """T frames of a head with ARKit's shapes or with channels of its own; all arrays are kept as float32."""
 
     names: tuple[str, ...]
-    """N shapes; the columns of `weights`."""
+    """N shapes or channels; the columns of `weights`."""
     weights: NDArray[Any]
-    """[T, N] 0..1."""
+    """[T, N], each in its range."""
     head: NDArray[Any]
     """[T, 6] rotation vector (rad) and translation (mm) of the head about the rig's pivot."""
     gaze: NDArray[Any]
@@ -29,6 +29,8 @@ class FaceAnimation:
     """Frames per second, Hz."""
     residual_mm: NDArray[Any] | None = None
     """[T] root mean square distance of the solved markers from the asked ones, where weights were solved."""
+    ranges: NDArray[Any] | None = None
+    """[N, 2] lowest and highest weight of channels that have limits of their own; 0..1 without."""
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.weights))
@@ -41,12 +43,24 @@ class FaceAnimation:
             raise FacesynthError(
                 f"an animation needs at least one frame and a positive fps; got {count} frames at {self.fps} fps"
             )
-        if self.weights.min(initial=0.0) < 0 or self.weights.max(initial=0.0) > 1:
-            low, high = self.weights.min(), self.weights.max()
-            raise FacesynthError(f"weights must lie in 0..1; got {low:.3f}..{high:.3f}; clip them before")
+        if self.ranges is not None:
+            object.__setattr__(self, "ranges", _checked(self.ranges, (len(self.names), 2), "ranges"))
+        low, high = self.limits
+        if (self.weights < low).any() or (self.weights > high).any():
+            wanted = "0..1" if self.ranges is None else "the ranges of their channels"
+            raise FacesynthError(
+                f"weights must lie in {wanted}; got {self.weights.min():.3f}..{self.weights.max():.3f}; clip them before"
+            )
 
     def __len__(self) -> int:
         return len(self.weights)
+
+    @property
+    def limits(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lowest and highest weight [N] of each channel."""
+        if self.ranges is None:
+            return np.zeros(len(self.names), np.float32), np.ones(len(self.names), np.float32)
+        return self.ranges[:, 0], self.ranges[:, 1]
 
     @property
     def duration_s(self) -> float:
@@ -70,7 +84,7 @@ class FaceAnimation:
         """The same movement at another rate; 23.976 and 29.97 are fine.
 
         Monotone cubic interpolation, which never leaves the range of its neighbours, so that weights
-        stay in 0..1 and a shut eye stays shut; the head turns on the shortest arc.
+        stay in their ranges and a shut eye stays shut; the head turns on the shortest arc.
         """
         from scipy.interpolate import PchipInterpolator
         from scipy.spatial.transform import Rotation, Slerp
@@ -86,17 +100,22 @@ class FaceAnimation:
         def curve(values: NDArray[Any]) -> NDArray[np.float64]:
             return PchipInterpolator(self.times_s, values, axis=0)(at)
 
-        head = np.concatenate([rotation, curve(self.head[:, 3:])], axis=1)
-        weights = np.clip(curve(self.weights), 0, 1)
-        residual = None if self.residual_mm is None else curve(self.residual_mm)
-        return FaceAnimation(self.names, weights, head, curve(self.gaze), curve(self.tongue_up), fps, residual)
+        return replace(
+            self,
+            weights=np.clip(curve(self.weights), *self.limits),
+            head=np.concatenate([rotation, curve(self.head[:, 3:])], axis=1),
+            gaze=curve(self.gaze),
+            tongue_up=curve(self.tongue_up),
+            fps=fps,
+            residual_mm=None if self.residual_mm is None else curve(self.residual_mm),
+        )
 
     def _stretched(self, fps: float) -> FaceAnimation:
+        """One frame, held."""
         many = np.zeros(max(1, round(self.duration_s * fps)), np.int64)
         residual = None if self.residual_mm is None else self.residual_mm[many]
-        return FaceAnimation(
-            self.names, self.weights[many], self.head[many], self.gaze[many], self.tongue_up[many], fps, residual
-        )
+        tracks = {name: getattr(self, name)[many] for name in ("weights", "head", "gaze", "tongue_up")}
+        return replace(self, fps=fps, residual_mm=residual, **tracks)
 
 
 def _checked(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float32]:

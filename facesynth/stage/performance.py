@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.files.write import SUFFIXES, require_arkit, write_animation
-from facesynth.face.rig.arkit_rig import Rig, pose
+from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animation
+from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.method import Method
 from facesynth.motion.sway import quiet_head
-from facesynth.progress import track
 
 if TYPE_CHECKING:
     from facesynth.face.deform.skin import MarkerSkin
-    from facesynth.face.draw.render import Renderer
     from facesynth.face.rig.own_head import OwnHead
 
 VIDEO_SUFFIXES = (".mp4",)
@@ -105,58 +101,27 @@ def check_output(path: str | Path) -> Path:
 
 
 def write_performance(
-    path: str | Path, performance: Performance, rig: Rig, size: tuple[int, int] = (1280, 720), own: OwnHead | None = None
+    path: str | Path, performance: Performance, head: Rig | OwnHead, size: tuple[int, int] = (1280, 720)
 ) -> None:
-    """Write one output; the suffix says which. It appears whole or not at all.
+    """Write one output of the head that is shown; the suffix says which. It appears whole or not at all."""
+    from facesynth.face.rig.channel_map import on_channels
+    from facesynth.face.rig.own_head import OwnHead
 
-    own: the head that is shown, if it is not the built-in one.
-    """
-    is_video = check_output(path).suffix.lower() in VIDEO_SUFFIXES
-    if own is not None and (is_video or Path(path).suffix.lower() != ".bvh"):
-        _write_on(own, path, performance, size)
-        return
-    if not is_video:
-        write_animation(path, performance.animation, rig, performance.motion)
-        return
+    shown = on_channels(performance.animation, head.map) if isinstance(head, OwnHead) else performance.animation
+    if check_output(path).suffix.lower() in VIDEO_SUFFIXES:
+        _write_video(path, replace(performance, animation=shown), head, size)
+    else:
+        write_animation(path, shown, head, performance.motion)
+
+
+def _write_video(path: str | Path, performance: Performance, head: Rig | OwnHead, size: tuple[int, int]) -> None:
     from facesynth.face.draw.render import Renderer
     from facesynth.face.draw.video import write_video
 
-    require_arkit(performance.animation, path)
-    frames = rendered(performance, rig, Renderer(rig, size))
-    write_video(path, frames, performance.animation.fps, performance.speech.audio, performance.speech.sample_rate)
-
-
-def _write_on(own: OwnHead, path: str | Path, performance: Performance, size: tuple[int, int]) -> None:
-    from facesynth.face.files.own import write_own
-    from facesynth.face.own_animation import on_channels
-
-    animation = on_channels(performance.animation, own.map)
-    if Path(path).suffix.lower() not in VIDEO_SUFFIXES:
-        write_own(path, animation, own)
-        return
-    from facesynth.face.draw.own_render import OwnRenderer
-    from facesynth.face.draw.video import write_video
-
-    pictures = OwnRenderer(own, size).pictures(animation)
-    write_video(path, pictures, animation.fps, performance.speech.audio, performance.speech.sample_rate)
-
-
-def rendered(performance: Performance, rig: Rig, renderer: Renderer) -> Iterator[NDArray[np.uint8]]:
-    """Pictures [h, w, 3] of the face, one for each frame; the next two are drawn while one is encoded."""
-    animation, skin = performance.animation, performance.skin
-
-    def draw(k: int) -> NDArray[np.uint8]:
-        return renderer.render(skin.vertices(k)) if skin else picture(animation, k, rig, renderer)
-
-    frames, ahead = iter(range(len(animation))), deque[Future[NDArray[np.uint8]]]()
-    with ThreadPoolExecutor(2, "picture") as painters:
-        for _ in track(range(len(animation)), "rendering"):
-            for k in islice(frames, 3 - len(ahead)):
-                ahead.append(painters.submit(draw, k))
-            yield ahead.popleft().result()
-
-
-def picture(animation: FaceAnimation, k: int, rig: Rig, renderer: Renderer) -> NDArray[np.uint8]:
-    """The face [h, w, 3] at frame k."""
-    vertices = pose(rig, animation.weights[k], animation.head[k], animation.gaze[k], float(animation.tongue_up[k]))
-    return renderer.render(vertices)
+    animation, speech = performance.animation, performance.speech
+    vertices: Callable[[int], ArrayLike] = partial(head.vertices, animation)
+    if isinstance(head, Rig):
+        require_arkit(animation, path)
+        vertices = performance.skin.vertices if performance.skin else vertices
+    pictures = Renderer.of(head, size).pictures(len(animation), vertices)
+    write_video(path, pictures, animation.fps, speech.audio, speech.sample_rate)

@@ -3,7 +3,7 @@
 import numpy as np
 import pygltflib as gl
 
-from facesynth.face.files.gltf_buffer import Buffer
+from facesynth.face.files.gltf.buffer import Buffer
 
 SIDE = 13
 SHAPES = ("Mouth_Open", "Smile_L", "Smile_R", "Blink", "Frozen")

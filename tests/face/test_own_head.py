@@ -6,10 +6,10 @@ from own_heads import MAPPING, SHAPES, mask, write_mask, write_obj
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.draw.own_render import OwnRenderer
-from facesynth.face.files.own import write_own
-from facesynth.face.own_animation import OwnAnimation, on_channels
+from facesynth.face.draw.render import Renderer
+from facesynth.face.files.formats import write_animation
 from facesynth.face.rig.arkit import ARKIT_NAMES
+from facesynth.face.rig.channel_map import on_channels
 from facesynth.face.rig.own_head import load_own_head
 from facesynth.inference.errors import FacesynthError
 
@@ -68,7 +68,7 @@ def test_any_unit_and_any_placement_of_nodes_gives_the_same_head(head, tmp_path)
 
 def test_what_is_written_is_the_same_head_with_the_animation(head, tmp_path):
     own = on_channels(animation(), head.map)
-    write_own(tmp_path / "out.glb", own, head)
+    write_animation(tmp_path / "out.glb", own, head)
     shutil.copy(tmp_path / "mask.yaml", tmp_path / "out.yaml")
     again = load_own_head(tmp_path / "out.glb")
     np.testing.assert_allclose(again.rest_mm, head.rest_mm, atol=1e-3)
@@ -76,20 +76,20 @@ def test_what_is_written_is_the_same_head_with_the_animation(head, tmp_path):
 
     for k in (0, 5):
         there = played(tmp_path / "out.glb", k) * head.mm_per_unit - head.middle * head.mm_per_unit
-        np.testing.assert_allclose(there, head.posed(own.values[k], own.head[k], own.gaze[k]), atol=0.05)
+        np.testing.assert_allclose(there, head.posed(own.weights[k], own.head[k], own.gaze[k]), atol=0.05)
 
 
 def test_curves_and_arrays_of_a_head(head, tmp_path):
     own = on_channels(animation(), head.map)
-    write_own(tmp_path / "out.csv", own, head)
+    write_animation(tmp_path / "out.csv", own, head)
     table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
     assert table.dtype.names == ("time_s", *SHAPES)
     np.testing.assert_allclose(table["Mouth_Open"], np.clip(np.linspace(0, 0.6, 6) * 0.5 + 0.1, 0, 0.4), atol=1e-7)
-    write_own(tmp_path / "out.npz", own, head)
+    write_animation(tmp_path / "out.npz", own, head)
     with np.load(tmp_path / "out.npz") as stored:
-        np.testing.assert_allclose(stored["weights"], own.values, atol=1e-6)
-    with pytest.raises(FacesynthError, match="unknown output"):
-        write_own(tmp_path / "out.fbx", own, head)
+        np.testing.assert_allclose(stored["weights"], own.weights, atol=1e-6)
+    with pytest.raises(FacesynthError, match="unknown animation file type"):
+        write_animation(tmp_path / "out.fbx", own, head)
 
 
 def test_a_folder_of_obj_files_is_a_head(head, tmp_path):
@@ -104,18 +104,18 @@ def test_a_folder_of_obj_files_is_a_head(head, tmp_path):
     height = np.ptp(own.face_mm[:, 1])
     assert height == pytest.approx(150)
     shown = on_channels(animation(), own.map)
-    write_own(tmp_path / "out.glb", shown, own)
+    write_animation(tmp_path / "out.glb", shown, own)
     from gltf_reading import played
 
     there = played(tmp_path / "out.glb", 5) * 1000
-    np.testing.assert_allclose(there, own.posed(shown.values[5], shown.head[5]), atol=0.01)
+    np.testing.assert_allclose(there, own.posed(shown.weights[5], shown.head[5]), atol=0.01)
     write_obj(folder / "brow.obj", vertices[:-1], triangles[:4])
     with pytest.raises(FacesynthError, match=r"brow\.obj has 168 vertices"):
         load_own_head(folder)
 
 
 def test_pictures_show_the_mouth_open(head):
-    renderer = OwnRenderer(head, (96, 96))
+    renderer = Renderer.of(head, (96, 96))
     shut, wide = (renderer.render(head.posed([value, 0, 0, 0, 0])) for value in (0.0, 1.0))
     assert shut.shape == (96, 96, 3)
     assert np.abs(shut.astype(int) - wide).max() > 30
@@ -127,8 +127,8 @@ def test_pictures_show_the_mouth_open(head):
 
 def test_own_curves_need_no_detour(head):
     own = FaceAnimation(SHAPES, np.full((2, 5), 0.25), np.zeros((2, 6)), np.zeros((2, 2)), np.zeros(2), 30)
-    assert isinstance(on_channels(own, head.map), OwnAnimation)
-    np.testing.assert_allclose(on_channels(own, head.map).values, 0.25)
+    assert on_channels(own, head.map).names == SHAPES
+    np.testing.assert_allclose(on_channels(own, head.map).weights, 0.25)
     strange = FaceAnimation(("a",), np.zeros((2, 1)), np.zeros((2, 6)), np.zeros((2, 2)), np.zeros(2), 30)
     with pytest.raises(FacesynthError, match="neither this head's nor ARKit's"):
         on_channels(strange, head.map)

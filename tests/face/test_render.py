@@ -3,8 +3,9 @@ import pytest
 
 from facesynth.face.draw import render
 from facesynth.face.draw.bake import baked_head
+from facesynth.face.draw.camera import Camera
 from facesynth.face.draw.occlusion import sky_directions, sky_visibility
-from facesynth.face.draw.render import Camera, Renderer
+from facesynth.face.draw.render import Renderer
 from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import pose
 from facesynth.inference.errors import FacesynthError
@@ -14,7 +15,7 @@ SIZE = (160, 90)
 
 @pytest.fixture(scope="module")
 def renderer(rig):
-    return Renderer(rig, SIZE)
+    return Renderer.of(rig, SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_a_picture_is_the_same_bytes_every_time(rig, renderer, portrait):
 def test_the_number_of_threads_changes_nothing(rig, portrait, monkeypatch):
     for cores in (1, 5):
         monkeypatch.setattr(render, "available_cores", lambda cores=cores: cores)
-        np.testing.assert_array_equal(portrait, Renderer(rig, SIZE).render(rig.rest_mm))
+        np.testing.assert_array_equal(portrait, Renderer.of(rig, SIZE).render(rig.rest_mm))
 
 
 def test_only_the_backdrop_where_nobody_is(rig, renderer, portrait):
@@ -124,11 +125,11 @@ def test_bad_vertices_are_refused(renderer, bad):
 @pytest.mark.parametrize("size", [(0, 10), (100000, 90), (1, 2, 3)])
 def test_bad_sizes_are_refused(rig, size):
     with pytest.raises(FacesynthError):
-        Renderer(rig, size)
+        Renderer.of(rig, size)
 
 
 def test_odd_sizes_are_drawn_to_the_last_pixel(rig):
-    picture = Renderer(rig, (101, 67)).render(rig.rest_mm)
+    picture = Renderer.of(rig, (101, 67)).render(rig.rest_mm)
     assert picture.shape == (67, 101, 3)
     assert picture[-1, -1].max() > 5
 

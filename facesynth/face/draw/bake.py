@@ -1,4 +1,4 @@
-"""Everything about the look of the head that does not change from frame to frame, worked out once and cached."""
+"""The look of the built-in head, worked out once and cached."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from scipy import sparse
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.face.draw.albedo import inside_mouth, paint_skin, scalp, step
+from facesynth.face.draw.camera import Camera
+from facesynth.face.draw.look import Eyeball, LitSphere, Look
 from facesynth.face.draw.occlusion import sky_visibility
 from facesynth.face.draw.raster import vertex_normals
 from facesynth.face.draw.shading import EYE, HIDDEN, SKIN, TEETH, TONGUE, Surface
@@ -19,16 +21,18 @@ from facesynth.face.draw.strands import Skin, Strands, grow_all, hair_volume_mm
 from facesynth.face.draw.subdivision import catmull_clark, refine_corners
 from facesynth.face.rig.anny import PARTS, head_folder, head_key
 from facesynth.face.rig.arkit_rig import Rig, pose
+from facesynth.face.rig.markers import INNER_LIPS, MIDDLE_LIPS
 
 _VERSION = 2  # raise it whenever what is baked changes
 _MATERIALS = np.array([SKIN, EYE, EYE, TEETH, TEETH, TONGUE, HIDDEN, HIDDEN, HIDDEN, HIDDEN], np.uint8)
 _STRAND_FIELDS = ("lift_mm", "segments", "width_mm", "colour", "horizon", "raised_mm")
+_LIT = LitSphere(np.array([0.0, -30.0, 60.0]), 190.0)
 _LIP_DEPTH_MM = 146.0  # z of the lips at rest: the mouth darkens behind it
 
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """The head, refined once, ready for drawing."""
+    """What takes seconds to work out."""
 
     refine: sparse.csr_matrix
     """[N, V] cage vertices to fine vertices."""
@@ -36,6 +40,24 @@ class Baked:
     strands: Strands
     cap_mm: NDArray[np.float32]
     """[N] thickness of the hair over each vertex, for the shadow it throws."""
+
+
+def built_in_look(rig: Rig) -> Look:
+    """The built-in head with hair, eyes, teeth and painted skin."""
+    baked = baked_head(rig)
+    left, right = (
+        Eyeball(ball := rig.vertices_of(f"{side}_eye"), rig.rest_mm[ball], rig.eye_centre_mm(side)) for side in ("left", "right")
+    )
+    return Look(
+        baked.surface,
+        _LIT,
+        Camera(),
+        refine=baked.refine,
+        strands=baked.strands,
+        cap_mm=baked.cap_mm,
+        eyes=(left, right),
+        lips=rig.from_source(np.array(INNER_LIPS[MIDDLE_LIPS]).T),
+    )
 
 
 def baked_head(rig: Rig) -> Baked:

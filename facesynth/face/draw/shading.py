@@ -30,6 +30,8 @@ _GROUND = np.array([0.13, 0.095, 0.078])
 _WRAP = np.array([0.24, 0.13, 0.10])  # light that travels through skin past the edge of shadow: red goes farthest
 REACH = 2
 """Texels of the shadow map that are looked at to each side of a point."""
+OPEN_MM = 7.0
+"""From this opening of the lips on the mouth is lit as if they were not there."""
 _RAMP_MM = 4.0  # an occluder that far in front shades fully
 
 
@@ -357,7 +359,7 @@ def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArra
         shot.eyes,
         shot.camera,
     )
-    mouth = 0.12 + 0.88 * smoothstep(0.0, 7.0, shot.mouth_mm[0])
+    mouth = 0.12 + 0.88 * smoothstep(0.0, OPEN_MM, shot.mouth_mm[0])
     for k in range(len(fragments)):
         quad, half = fragments[k, 0] >> 1, fragments[k, 0] & 1
         a, b, c = quads[quad, 0], quads[quad, 1 + half], quads[quad, 2 + half]

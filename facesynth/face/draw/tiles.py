@@ -25,6 +25,9 @@ class Hair(NamedTuple):
     """[M, 2]"""
 
 
+NO_HAIR = Hair(np.zeros((0, 3), np.float32), np.zeros(0, np.float32), np.zeros((0, 3), np.float32), np.zeros((0, 2), np.int32))
+
+
 class Bins(NamedTuple):
     """What touches each tile: triangles, and segments nearest first."""
 

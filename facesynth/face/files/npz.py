@@ -20,13 +20,14 @@ _ANIMATION = ("names", "weights", "head", "gaze", "tongue_up", "fps")
 def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None = None) -> None:
     """Write the animation, and beside it the motion it was made from, each at its own rate.
 
-    Keys: names, weights, head, gaze, tongue_up, fps, residual_mm; frames, frames_fps, frames_head,
+    Keys: names, weights, head, gaze, tongue_up, fps, residual_mm, ranges; frames, frames_fps, frames_head,
     frames_eyes and layout (JSON text) of the motion.
     """
     arrays: dict[str, np.ndarray] = {"names": np.array(animation.names), "weights": animation.weights, "head": animation.head}
     arrays |= {"gaze": animation.gaze, "tongue_up": animation.tongue_up, "fps": np.array(animation.fps)}
-    if animation.residual_mm is not None:
-        arrays["residual_mm"] = animation.residual_mm
+    for name in ("residual_mm", "ranges"):
+        if getattr(animation, name) is not None:
+            arrays[name] = getattr(animation, name)
     if motion is not None:
         arrays |= {"frames": motion.frames, "frames_fps": np.array(motion.fps)}
         arrays["layout"] = np.array(json.dumps(motion.layout.to_dict(), sort_keys=True))
@@ -56,6 +57,7 @@ def read_npz(path: str | Path) -> tuple[FaceAnimation, Motion | None]:
         arrays["tongue_up"],
         float(arrays["fps"]),
         arrays.get("residual_mm"),
+        arrays.get("ranges"),
     )
     return animation, _motion(arrays) if "frames" in arrays else None
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
+from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.anny import PARTS, build_head, head_folder, head_key
 from facesynth.face.rig.arkit import ARKIT_NAMES, checked_weights, eye_rotations, gaze_weights
 from facesynth.inference.errors import FacesynthError
@@ -63,6 +64,11 @@ class Rig:
         if (self.source_index[found] != wanted).any():
             raise FacesynthError(f"source vertices {wanted[self.source_index[found] != wanted].tolist()} are not on this head")
         return found
+
+    def vertices(self, animation: FaceAnimation, k: int) -> NDArray[np.float32]:
+        """[V, 3] mm at frame k of an animation; shapes that it lacks stay at rest."""
+        weights = animation.weights_for(self.names)[k]
+        return pose(self, weights, animation.head[k], animation.gaze[k], float(animation.tongue_up[k]))
 
     @cached_property
     def _eyeballs(self) -> tuple[tuple[NDArray[np.int64], NDArray[np.float64]], ...]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError, unknown
 
@@ -80,6 +81,11 @@ class ChannelMap:
         return weights
 
     @property
+    def ranges(self) -> NDArray[np.float64]:
+        """[N, 2] lowest and highest value of each channel; a mute one stays at 0."""
+        return np.array([(0.0, 0.0) if channel.mute else (channel.low, channel.high) for channel in self.channels])
+
+    @property
     def _mix(self) -> NDArray[np.float64]:
         """[52, N] share of each weight in each channel."""
         mix = np.zeros((len(ARKIT_NAMES), len(self.names)))
@@ -92,6 +98,19 @@ class ChannelMap:
     def _columns(self) -> NDArray[np.float64]:
         """[5, N] gain, offset, low, high, and 0 where a channel is mute."""
         return np.array([[c.gain, c.offset, c.low, c.high, not c.mute] for c in self.channels], np.float64).T
+
+
+def on_channels(animation: FaceAnimation, channel_map: ChannelMap) -> FaceAnimation:
+    """An animation in the channels of a map: by their own names where it has those, else from its ARKit weights."""
+    names = channel_map.names
+    if set(names) <= set(animation.names):
+        low, high = (np.array([limit[animation.names.index(name)] for name in names]) for limit in animation.limits)
+        return replace(animation, names=names, weights=animation.weights_for(names), ranges=np.stack([low, high], axis=1))
+    if not set(animation.names) & set(ARKIT_NAMES):
+        odd = ", ".join(animation.names[:3])
+        raise FacesynthError(f"the curves {odd} … are neither this head's nor ARKit's; give a mapping file (--mapping)")
+    values = channel_map.own(animation.weights_for(ARKIT_NAMES))
+    return replace(animation, names=names, weights=values, ranges=channel_map.ranges)
 
 
 def _bounded(basis: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:

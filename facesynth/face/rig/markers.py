@@ -65,7 +65,8 @@ INNER_LIPS: tuple[tuple[int, int], ...] = (
 )  # fmt: skip
 """Seven facing pairs (upper, lower) of the inner lips from the performer's right to left, as source vertices."""
 
-_CENTRE = slice(2, 5)  # beyond 10 mm from the middle the pairs do not face each other closely enough
+MIDDLE_LIPS = slice(2, 5)
+"""Of those, the three pairs in the middle; beyond 10 mm from it they do not face each other closely enough."""
 
 
 def marker_layout(rig: Rig) -> Layout:
@@ -124,7 +125,7 @@ class LipGap:
 
     def opening_mm(self, weights: ArrayLike) -> NDArray[np.float64]:
         """[T] mean gap of the three pairs in the middle."""
-        return self.gaps_mm(weights)[..., _CENTRE].mean(axis=-1)
+        return self.gaps_mm(weights)[..., MIDDLE_LIPS].mean(axis=-1)
 
     def closed(self, weights: ArrayLike, target_mm: ArrayLike, amount: ArrayLike = 1.0) -> NDArray[np.float64]:
         """Weights [T, 52] with as much mouthClose added as brings the opening down to `target_mm`.
@@ -135,5 +136,5 @@ class LipGap:
         column = ARKIT_NAMES.index("mouthClose")
         values = np.array(weights, np.float64)
         excess_mm = np.maximum(self.opening_mm(values) - np.asarray(target_mm), 0) * np.asarray(amount)
-        values[..., column] += excess_mm / -self.slopes_mm[_CENTRE, column].mean()
+        values[..., column] += excess_mm / -self.slopes_mm[MIDDLE_LIPS, column].mean()
         return values

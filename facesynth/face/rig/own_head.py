@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from facesynth.face.files.gltf_read import Part, Scene, read_scene
+from facesynth.face.animation import FaceAnimation
+from facesynth.face.files.gltf.scene import Part, Scene, read_scene
 from facesynth.face.rig.channel_map import ChannelMap
 from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
 from facesynth.face.rig.obj import read_shapes
@@ -65,6 +66,10 @@ class OwnHead:
     def names(self) -> tuple[str, ...]:
         """The N channels."""
         return self.map.names
+
+    def vertices(self, animation: FaceAnimation, k: int) -> NDArray[np.float32]:
+        """[V, 3] mm at frame k of an animation of this head's channels."""
+        return self.posed(animation.weights[k], animation.head[k], animation.gaze[k])
 
     def posed(self, values: ArrayLike, head: ArrayLike | None = None, gaze: ArrayLike | None = None) -> NDArray[np.float32]:
         """Vertices [V, 3] under channel values [N], a head pose [6] (rad, mm about `pivot_mm`) and a gaze [2] (rad left, up)."""

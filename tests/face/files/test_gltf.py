@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.files import write_animation
+from facesynth.face.files.formats import write_animation
 from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
 from facesynth.face.rig.arkit_rig import pose
 

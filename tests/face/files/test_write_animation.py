@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.files import SUFFIXES, write_animation
+from facesynth.face.files.formats import SUFFIXES, write_animation
 from facesynth.face.files.livelink import COUNT, HEADER, read_livelink, take_of, write_livelink
 from facesynth.face.files.npz import read_npz
 from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, timecode

@@ -1,24 +1,29 @@
-"""The head with its 52 shapes and an animation as glTF 2.0, in one binary file."""
+"""The built-in head with its 52 shapes and an animation as a glTF document."""
 
 from __future__ import annotations
 
 import io
-from pathlib import Path
 
 import numpy as np
 import pygltflib as gl
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from facesynth.atomic import atomic_path
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.files.gltf_buffer import Buffer
-from facesynth.face.files.mesh import TriangleMesh
+from facesynth.face.files.gltf.buffer import Buffer
+from facesynth.face.files.gltf.mesh import M_PER_MM, TriangleMesh, add_mesh, add_targets
+from facesynth.face.files.gltf.tracks import (
+    Track,
+    eye_turns,
+    head_turns,
+    rotation_track,
+    speech_animation,
+    translation_track,
+    weights_track,
+)
 from facesynth.face.files.skin_picture import skin_jpeg
 from facesynth.face.rig.anny import PARTS
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
 
-M_PER_MM = 1e-3  # glTF counts in metres
 EYES = ("left_eye", "right_eye")
 FACE_PARTS = tuple(part for part in PARTS if part not in EYES)
 IRIS_MM, PUPIL_MM = 5.9, 2.1
@@ -35,8 +40,8 @@ _COLOURS = {  # linear base colour, roughness
 _TEXTURES = {"eyes": 0, "skin": 1}
 
 
-def write_glb(path: str | Path, animation: FaceAnimation, rig: Rig) -> None:
-    """Write the head, its shapes and the animation.
+def built_in_document(animation: FaceAnimation, rig: Rig) -> tuple[gl.GLTF2, Buffer]:
+    """The head, its shapes and the animation.
 
     Node `face` is the mesh with 52 named morph targets; `head` is the joint that turns it about the top of the
     neck, and shoulders stay with `torso`; `left_eye` and `right_eye` turn in the head. Units are metres.
@@ -51,7 +56,7 @@ def write_glb(path: str | Path, animation: FaceAnimation, rig: Rig) -> None:
         meshes=[face, *eyes],
         skins=[gl.Skin(joints=[1, 2], skeleton=1, inverseBindMatrices=_inverse_binds(buffer))],
         materials=_materials(),
-        animations=[_animation(buffer, animation, rig)],
+        animations=[speech_animation(buffer, animation, _tracks(animation, rig))],
         images=[
             gl.Image(bufferView=buffer.view(_iris_png()), mimeType="image/png"),
             gl.Image(bufferView=buffer.view(skin_jpeg(rig)), mimeType="image/jpeg"),
@@ -59,11 +64,19 @@ def write_glb(path: str | Path, animation: FaceAnimation, rig: Rig) -> None:
         samplers=[gl.Sampler(magFilter=gl.LINEAR, minFilter=gl.LINEAR, wrapS=gl.CLAMP_TO_EDGE, wrapT=gl.CLAMP_TO_EDGE)],
         textures=[gl.Texture(source=0, sampler=0), gl.Texture(source=1, sampler=0)],
     )
-    document.accessors, document.bufferViews = buffer.accessors, buffer.views
-    document.buffers = [gl.Buffer(byteLength=len(buffer.data))]
-    document.set_binary_blob(bytes(buffer.data))
-    with atomic_path(path) as part:
-        part.write_bytes(b"".join(document.save_to_bytes()))
+    return document, buffer
+
+
+def _tracks(animation: FaceAnimation, rig: Rig) -> list[Track]:
+    head, left_eye, right_eye = 2, 3, 4
+    look = eye_turns(animation)
+    return [
+        weights_track(0, animation.weights_for(rig.names)),
+        rotation_track(head, head_turns(animation)),
+        translation_track(head, (PIVOT_MM + animation.head[:, 3:]) * M_PER_MM),
+        rotation_track(left_eye, look),
+        rotation_track(right_eye, look),
+    ]
 
 
 def _nodes(rig: Rig) -> list[gl.Node]:
@@ -78,13 +91,13 @@ def _nodes(rig: Rig) -> list[gl.Node]:
 def _face(buffer: Buffer, rig: Rig) -> gl.Mesh:
     """All parts but the eyes: one set of vertices, one primitive per material."""
     mesh = TriangleMesh.of(rig, FACE_PARTS)
-    attributes = _attributes(buffer, mesh, rig.rest_mm)
+    attributes = add_mesh(buffer, mesh, rig.rest_mm)
     share = rig.head_weight[mesh.source].astype(np.float32)
     weights = np.stack([1 - share, share, 0 * share, 0 * share], axis=1)
     joints = np.where(weights > 0, np.array([0, 1, 0, 0]), 0).astype(np.uint8)
     attributes.JOINTS_0 = buffer.add(joints, gl.ARRAY_BUFFER)
     attributes.WEIGHTS_0 = buffer.add(weights, gl.ARRAY_BUFFER)
-    targets = _targets(buffer, mesh, rig)
+    targets = add_targets(buffer, mesh, rig.rest_mm, rig.shapes_mm)
     primitives = []
     for material in (_SKIN, _TEETH, _TONGUE, _LASHES):
         parts = [tri for part, tri in mesh.triangles.items() if _MATERIAL_OF.get(part, _LASHES) == material]
@@ -99,58 +112,9 @@ def _eye(buffer: Buffer, rig: Rig, side: str) -> gl.Mesh:
     local_mm = rig.rest_mm - rig.eye_centre_mm(side).astype(np.float32)
     radius_mm = float(np.abs(local_mm[mesh.source, :2]).max())
     uv = (0.5 + local_mm[:, :2] / (2 * radius_mm)).astype(np.float32)
-    attributes = _attributes(buffer, TriangleMesh(mesh.source, uv[mesh.source], mesh.triangles), local_mm)
+    attributes = add_mesh(buffer, TriangleMesh(mesh.source, uv[mesh.source], mesh.triangles), local_mm)
     indices = buffer.add(mesh.all_triangles().astype(np.uint32).ravel(), gl.ELEMENT_ARRAY_BUFFER)
     return gl.Mesh(name=f"{side}_eye", primitives=[gl.Primitive(attributes=attributes, indices=indices, material=_EYE)])
-
-
-def _attributes(buffer: Buffer, mesh: TriangleMesh, vertices_mm: NDArray[np.float32]) -> gl.Attributes:
-    position = (vertices_mm[mesh.source] * M_PER_MM).astype(np.float32)
-    uv = np.stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]], axis=1)  # glTF's v points down
-    return gl.Attributes(
-        POSITION=buffer.add(position, gl.ARRAY_BUFFER),
-        NORMAL=buffer.add(mesh.normals(vertices_mm).astype(np.float32), gl.ARRAY_BUFFER),
-        TEXCOORD_0=buffer.add(uv.astype(np.float32), gl.ARRAY_BUFFER),
-    )
-
-
-def _targets(buffer: Buffer, mesh: TriangleMesh, rig: Rig) -> list[gl.Attributes]:
-    """Displacements of position and normal for each shape at weight 1; dense, because not every viewer reads sparse."""
-    rest = mesh.normals(rig.rest_mm)
-    targets = []
-    for shape in rig.shapes_mm:
-        position = (shape[mesh.source] * M_PER_MM).astype(np.float32)
-        normal = (mesh.normals(rig.rest_mm + shape) - rest).astype(np.float32)
-        added = [buffer.add(array, gl.ARRAY_BUFFER) for array in (position, normal)]
-        targets.append(gl.Attributes(POSITION=added[0], NORMAL=added[1], TEXCOORD_0=None))
-    return targets
-
-
-def _animation(buffer: Buffer, animation: FaceAnimation, rig: Rig) -> gl.Animation:
-    times = buffer.add(animation.times_s.astype(np.float32))
-    gaze = animation.gaze.astype(np.float64)
-    look = Rotation.from_euler("YX", np.stack([gaze[:, 0], -gaze[:, 1]], axis=1))
-    turn = Rotation.from_rotvec(animation.head[:, :3].astype(np.float64))
-    place = (PIVOT_MM + animation.head[:, 3:]) * M_PER_MM
-    tracks = [
-        (0, "weights", animation.weights_for(rig.names).ravel()),
-        (2, "rotation", _quaternions(turn)),
-        (2, "translation", place.astype(np.float32)),
-        (3, "rotation", _quaternions(look)),
-        (4, "rotation", _quaternions(look)),
-    ]
-    channels, samplers = [], []
-    for index, (node, path, values) in enumerate(tracks):
-        samplers.append(gl.AnimationSampler(input=times, output=buffer.add(values), interpolation="LINEAR"))
-        channels.append(gl.AnimationChannel(sampler=index, target=gl.AnimationChannelTarget(node=node, path=path)))
-    return gl.Animation(name="speech", channels=channels, samplers=samplers, extras={"fps": animation.fps})
-
-
-def _quaternions(rotations: Rotation) -> NDArray[np.float32]:
-    """[T, 4] x, y, z, w, each on the same side as the one before, so that players take the short way."""
-    quaternions = rotations.as_quat(canonical=True)
-    flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-    return (quaternions * np.concatenate([[1.0], flips])[:, None]).astype(np.float32)
 
 
 def _inverse_binds(buffer: Buffer) -> int:

@@ -1,25 +1,18 @@
-"""Reading glTF 2.0 that others wrote: meshes with morph targets where their nodes put them, and the colour of their skin."""
+"""What a glTF file shows at rest: meshes with morph targets where their nodes put them, and the colour of their skin."""
 
 from __future__ import annotations
 
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from facesynth.face.files.gltf.document import Buffers, in_one_line, read_document, target_names
 from facesynth.inference.errors import FacesynthError
-
-LARGEST_BYTES = 2**30
-MOST_VALUES = 4 * 10**8
-"""Numbers in one accessor; more than any head has."""
-_DTYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,22 +58,6 @@ class Scene:
         return np.array(found)
 
 
-def read_document(path: Path) -> gl.GLTF2:
-    """A .glb or .gltf file, taken apart; FacesynthError for anything else."""
-    if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_BYTES:
-        raise FacesynthError(f"{path} is missing, empty or larger than {LARGEST_BYTES >> 30} GB; export the head as .glb")
-    try:
-        document = gl.GLTF2().load_binary(str(path)) if path.suffix.lower() == ".glb" else gl.GLTF2().load_json(str(path))
-    except Exception as error:  # the library raises anything on damaged files
-        raise FacesynthError(f"{path} is no glTF 2.0 file, or is damaged ({_line(error)}); export it again") from None
-    if document is None or not document.meshes or not document.nodes:
-        raise FacesynthError(f"{path} holds no mesh; export the head as .glb, with its shape keys")
-    for extension in _COMPRESSED:
-        if extension in (document.extensionsRequired or []):
-            raise FacesynthError(f"{path} is compressed ({extension}); export it without compression")
-    return document
-
-
 def read_scene(path: Path, texels: int) -> Scene:
     """All triangles of a file with their morph targets; texels: points along a triangle's side at which colours are taken."""
     document = read_document(path)
@@ -89,74 +66,7 @@ def read_scene(path: Path, texels: int) -> Scene:
     except FacesynthError:
         raise
     except (AttributeError, IndexError, KeyError, TypeError, ValueError, ZeroDivisionError, MemoryError, RecursionError) as error:
-        raise FacesynthError(f"{path} breaks the rules of glTF ({_line(error)}); export it again") from None
-
-
-class Buffers:
-    """The arrays behind a document's accessors."""
-
-    def __init__(self, document: gl.GLTF2, path: Path) -> None:
-        self.document, self.path = document, path
-        self._blobs: dict[int, bytes] = {}
-
-    def array(self, index: int) -> NDArray[np.float64]:
-        """[count, width] an accessor's values, normalised integers as fractions."""
-        accessor = self.document.accessors[index]
-        dtype, width = np.dtype(_DTYPES[accessor.componentType]), _WIDTHS[accessor.type]
-        if not 0 < accessor.count <= MOST_VALUES // width:
-            raise FacesynthError(f"{self.path} states an array of {accessor.count} values; is it damaged?")
-        if accessor.bufferView is None:
-            values = np.zeros((accessor.count, width))
-        else:
-            values = self._view(accessor.bufferView, accessor.byteOffset or 0, accessor.count, dtype, width)
-        if accessor.sparse is not None:
-            sparse = accessor.sparse
-            kind = np.dtype(_DTYPES[sparse.indices.componentType])
-            at = self._view(sparse.indices.bufferView, sparse.indices.byteOffset or 0, sparse.count, kind, 1)
-            new = self._view(sparse.values.bufferView, sparse.values.byteOffset or 0, sparse.count, dtype, width)
-            values[at[:, 0].astype(np.int64)] = new
-        if accessor.normalized and dtype.kind in "iu":
-            values = np.maximum(values / float(np.iinfo(dtype.name).max), -1.0)
-        if not np.isfinite(values).all():
-            raise FacesynthError(f"{self.path} holds values that are not finite; export it again")
-        return values
-
-    def bytes_of(self, view: int) -> bytes:
-        """The bytes of a buffer view, such as a picture."""
-        found = self.document.bufferViews[view]
-        start = found.byteOffset or 0
-        return self.blob(found.buffer)[start : start + found.byteLength]
-
-    def _view(self, index: int, offset: int, count: int, dtype: np.dtype[Any], width: int) -> NDArray[np.float64]:
-        view = self.document.bufferViews[index]
-        stride = view.byteStride or dtype.itemsize * width
-        start = (view.byteOffset or 0) + offset
-        data = np.frombuffer(self.blob(view.buffer), np.uint8)
-        if start + (count - 1) * stride + dtype.itemsize * width > len(data) or stride < dtype.itemsize * width or start < 0:
-            raise FacesynthError(f"{self.path} is cut off: an array ends beyond the file; copy it again")
-        rows = np.lib.stride_tricks.as_strided(data[start:], (count, dtype.itemsize * width), (stride, 1))
-        return np.ascontiguousarray(rows).view(dtype.newbyteorder("<")).reshape(count, width).astype(np.float64)
-
-    def blob(self, index: int) -> bytes:
-        """All bytes of a buffer."""
-        if index not in self._blobs:
-            uri = self.document.buffers[index].uri
-            blob = self.document.binary_blob() if not uri else self.from_uri(uri)
-            if blob is None:
-                raise FacesynthError(f"{self.path} lacks its binary part; export it as .glb")
-            self._blobs[index] = bytes(blob)
-        return self._blobs[index]
-
-    def from_uri(self, uri: str) -> bytes:
-        """Bytes written into the document, or of a file beside it."""
-        import base64
-
-        if uri.startswith("data:"):
-            return base64.b64decode(uri.partition(",")[2])
-        beside = self.path.parent / Path(uri).name
-        if Path(uri).name != uri or not beside.is_file():
-            raise FacesynthError(f"{self.path} needs {uri!r} beside it; export everything into one .glb")
-        return beside.read_bytes()
+        raise FacesynthError(f"{path} breaks the rules of glTF ({in_one_line(error)}); export it again") from None
 
 
 def _scene(document: gl.GLTF2, buffers: Buffers, texels: int) -> Scene:
@@ -218,13 +128,6 @@ def _part(
     }
     colours = _colours(document, buffers, primitive, triangles, texels)
     return Part(index, str(node.name or mesh.name or ""), world, triangles, targets, follows, colours)
-
-
-def target_names(mesh: gl.Mesh) -> tuple[str, ...]:
-    """Names of a mesh's morph targets, which exporters keep in its extras; numbers where there are none."""
-    count = max((len(primitive.targets or []) for primitive in mesh.primitives), default=0)
-    given = (mesh.extras or {}).get("targetNames") or []
-    return tuple(str(given[k]) if k < len(given) else f"target_{k}" for k in range(count))
 
 
 def _targets(buffers: Buffers, primitive: gl.Primitive, count: int) -> list[NDArray[np.float64]]:
@@ -313,7 +216,3 @@ def _picture(document: gl.GLTF2, buffers: Buffers, texture: int) -> NDArray[np.u
             return np.asarray(opened.convert("RGB"))
     except (OSError, ValueError, Image.DecompressionBombError):
         return None
-
-
-def _line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:200]
