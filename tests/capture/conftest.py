@@ -1,16 +1,7 @@
-"""Pictures that can be told apart, and the fetched models where they are here."""
+"""Pictures that can be told apart."""
 
 import numpy as np
 import pytest
-
-from facesynth.capture.models import MODELS, _kept
-
-
-@pytest.fixture
-def models():
-    """Skips where nobody has fetched the networks."""
-    if not all(_kept(name).is_file() for name in MODELS):
-        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
 
 
 @pytest.fixture

@@ -99,7 +99,7 @@ def test_a_face_is_followed_once_and_a_damaged_track_again(tmp_path, pictures, m
     assert len(made) == 3
 
 
-def test_a_real_talker_agrees_with_mediapipe_itself(models, recordings):
+def test_a_real_talker_agrees_with_mediapipe_itself(landmark_models, recordings):
     """468 points within 2.5 % of the eye distance of those that a newer model of MediaPipe recorded; the irises within 1.5 %."""
     clip = recordings("grid_s26") / "bgbsza.mpg"
     recorded = np.load(clip.with_name("bgbsza_mediapipe.npz"))
@@ -113,7 +113,7 @@ def test_a_real_talker_agrees_with_mediapipe_itself(models, recordings):
     assert np.median(irises) < 0.015
 
 
-def test_a_real_face_is_found_upright_tilted_and_small_and_two_are_two(models, recordings):
+def test_a_real_face_is_found_upright_tilted_and_small_and_two_are_two(landmark_models, recordings):
     clip = Path(recordings("grid_s26")) / "bgbsza.mpg"
     with open_video(clip) as video:
         image = next(iter(video.images))[1]
@@ -131,7 +131,7 @@ def test_a_real_face_is_found_upright_tilted_and_small_and_two_are_two(models, r
 
 
 @pytest.mark.slow
-def test_ten_clips_of_a_real_talker_agree_in_points_and_in_the_opening_of_the_lips(models, recordings):
+def test_ten_clips_of_a_real_talker_agree_in_points_and_in_the_opening_of_the_lips(landmark_models, recordings):
     off, alike = [], []
     for clip in sorted(recordings("grid_s26").glob("*.mpg")):
         recorded = np.load(clip.with_name(f"{clip.stem}_mediapipe.npz"))
@@ -147,7 +147,7 @@ def test_ten_clips_of_a_real_talker_agree_in_points_and_in_the_opening_of_the_li
     assert np.median(alike) >= 0.88
 
 
-def test_of_two_talkers_side_by_side_one_must_be_chosen(models, recordings, tmp_path):
+def test_of_two_talkers_side_by_side_one_must_be_chosen(landmark_models, recordings, tmp_path):
     from facesynth.capture.video import open_video
 
     beside = []

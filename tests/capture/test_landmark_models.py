@@ -64,7 +64,7 @@ def test_pip_is_called_with_a_list_and_its_failure_is_passed_on(empty_cache, mon
 def test_what_was_fetched_is_not_fetched_again(empty_cache, monkeypatch):
     empty_cache.mkdir(parents=True)
     for name in models.MODELS:
-        models._kept(name).write_bytes(b"")
+        models.model_path(name).write_bytes(b"")
     monkeypatch.setattr(subprocess, "run", None)
     assert models.fetch_landmarks() == empty_cache
     with pytest.raises(FacesynthError, match="damaged"):

@@ -234,7 +234,7 @@ def test_silence_is_one_clear_line(studio, tmp_path):
     assert not (tmp_path / "out.mp4").exists()
 
 
-def test_two_faces_or_none_are_refused(recordings, models, tmp_path):
+def test_two_faces_or_none_are_refused(recordings, landmark_models, tmp_path):
     """Where nobody says where the face is, it is looked for."""
     clip = read_video(sorted(recordings("grid_s26").glob("*.mpg"))[0])
     frames, audio = clip.frames[:30], clip.audio[: round(1.2 * clip.sample_rate)]

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
-from facesynth.face.rig.anny import head_folder
 from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout
 from facesynth.inference.motion import Motion
@@ -24,12 +23,8 @@ from facesynth.speech.textgrid import write_textgrid
 
 
 @pytest.fixture(scope="module")
-def shop(tmp_path_factory):
+def shop(rig, tmp_path_factory):
     """A performer whose markers are the head's; models of both methods, a detector and two recordings."""
-    try:
-        head_folder()
-    except ValueError as error:
-        pytest.skip(str(error))
     folder = tmp_path_factory.mktemp("feeling")
     corpus = on_the_head(folder, tiny_corpus(folder / "source", utterances=24, fps=60))
     AnimeGraph(variance=0.98, map_centres=30).fit(corpus).save(folder / "graph.safetensors")

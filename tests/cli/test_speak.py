@@ -11,7 +11,6 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
-from facesynth.face.rig.anny import head_folder
 from facesynth.methods.efase.method import Efase
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
@@ -49,15 +48,6 @@ def shop(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def head():
-    pytest.importorskip("PIL", reason="the built-in head needs pip install 'facesynth[head]'")
-    try:
-        head_folder()
-    except ValueError as error:
-        pytest.skip(str(error))
-
-
 def test_help_names_every_verb_without_importing_torch():
     program = "import sys; from facesynth.cli import cli; from click.testing import CliRunner; "
     program += "r = CliRunner().invoke(cli, ['--help']); assert r.exit_code == 0, r; print(r.output, 'torch' in sys.modules)"
@@ -85,7 +75,7 @@ def test_the_training_script_runs(shop, tmp_path, repository):
     assert model.exists()
 
 
-@pytest.mark.usefixtures("head")
+@pytest.mark.usefixtures("rig")
 def test_speak_writes_the_same_bytes_twice_and_explains(tmp_path):
     from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import marker_layout

@@ -9,7 +9,6 @@ from interrupted import contents, killed_and_repeated
 
 from facesynth.capture.kept_tracks import kept_track
 from facesynth.capture.landmarks import landmark_layout
-from facesynth.capture.models import MODELS, _kept
 from facesynth.capture.shape import neutral_shape
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
@@ -27,10 +26,8 @@ LINES = {"bgbsza": "bin green by s zero again", "lrbi7p": "lay red by i seven pl
 
 
 @pytest.fixture
-def clips(recordings, tmp_path):
+def clips(recordings, landmark_models, tmp_path):
     """Three clips of a real talker with what is said in them, and a file that is no video."""
-    if not all(_kept(name).is_file() for name in MODELS):
-        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
     folder = tmp_path / "clips"
     folder.mkdir()
     for name in LINES:
@@ -88,11 +85,10 @@ def test_two_processes_give_the_same_bytes_as_one(clips, tmp_path):
 
 
 @pytest.mark.slow
-def test_killed_fifty_times_while_following_faces_gives_the_same_corpus(clips, tmp_path, monkeypatch):
+def test_killed_fifty_times_while_following_faces_gives_the_same_corpus(clips, landmark_models, tmp_path, monkeypatch):
     """Every fifth time all tracks are forgotten, so that the end also comes while a face is followed."""
-    models = _kept("landmarks").parent
     monkeypatch.setenv("FACESYNTH_CACHE", str(tmp_path / "cache"))
-    shutil.copytree(models, tmp_path / "cache" / "landmarks")
+    shutil.copytree(landmark_models, tmp_path / "cache" / "landmarks")
     options = [*videos(clips), "--text-file", str(clips / "lines.csv"), "--performer", "A"]
     killed_and_repeated(
         lambda target: ["add", str(target), *options, "--jobs", "2"], tmp_path, 50, seed=6, forget=tmp_path / "cache" / "tracks"

@@ -13,7 +13,6 @@ import pytest
 from corpora import tiny_layout, tiny_utterances
 from interrupted import lasting
 
-from facesynth.capture.models import MODELS, _kept
 from facesynth.corpus import Corpus
 from facesynth.corpus.add.add import add
 from facesynth.speech.audio import load_audio, save_wav
@@ -125,13 +124,11 @@ def test_alignment_and_features_of_voices_are_the_same_over_ray(recordings, tmp_
 
 
 @pytest.mark.slow
-def test_faces_followed_by_ray_give_the_same_bytes(recordings, tmp_path):
+def test_faces_followed_by_ray_give_the_same_bytes(recordings, landmark_models, tmp_path):
     """Each engine with a cache of its own, so that each follows the faces itself."""
-    if not all(_kept(name).is_file() for name in MODELS):
-        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
     clips = [recordings("grid_s26") / f"{name}.mpg" for name in ("bgbsza", "lrbi7p", "swbm3n")]
     for engine in ("processes", "ray"):
-        shutil.copytree(_kept("landmarks").parent, tmp_path / engine / "landmarks")
+        shutil.copytree(landmark_models, tmp_path / engine / "landmarks")
         python(
             "import sys; from facesynth.cli import main; main()",
             *("corpus", "add", tmp_path / f"by {engine}", *clips, "--performer", "A", "--engine", engine, "--jobs", 2),

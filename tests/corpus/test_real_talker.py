@@ -1,12 +1,9 @@
 """What capture makes of a real talker: the mouth follows that talker's own sound, and the built-in head follows the mouth."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from grid import sentence
 
-from facesynth.capture.models import MODELS, _kept
 from facesynth.corpus.add.add import add
 from facesynth.corpus.checks.sync import LAGS, RATE, correlations, mouth_opening
 from facesynth.corpus.importers.video import corpus_from_video
@@ -15,32 +12,23 @@ from facesynth.inference.lips import lip_gap
 from facesynth.inference.motion import Motion
 
 
-def captured(folder, name, every=1):
-    from conftest import RECORDINGS
-
-    if not (RECORDINGS / name).is_dir():
-        pytest.skip(f"real recordings {name!r} are not here")
-    if not all(_kept(model).is_file() for model in MODELS):
-        pytest.skip("the models are not here; run `facesynth fetch landmarks`")
-    sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
-    videos = sorted((RECORDINGS / name).glob("*.mpg"))[::every]
-    made = corpus_from_video(folder / "c", videos, {"performer": name, "emotions": ["neutral"]})
-    from grid import sentence
-
+def captured(folder, recordings, every=1):
+    videos = sorted(recordings.glob("*.mpg"))[::every]
+    made = corpus_from_video(folder / "c", videos, {"performer": recordings.name, "emotions": ["neutral"]})
     report = add(made, videos, texts={video.stem: sentence(video.stem) for video in videos}, workers=Workers(1))
     assert len(report.added) >= 0.95 * len(videos), report.refused
     return made
 
 
 @pytest.fixture(scope="module")
-def corpus(tmp_path_factory):
-    return captured(tmp_path_factory.mktemp("s1"), "grid_s1", every=5)
+def corpus(recordings, landmark_models, tmp_path_factory):
+    return captured(tmp_path_factory.mktemp("s1"), recordings("grid_s1"), every=5)
 
 
 @pytest.fixture(scope="module")
-def bearded(tmp_path_factory):
+def bearded(recordings, landmark_models, tmp_path_factory):
     """A talker whose moustache hides the upper lip: its points lie 6 mm too high."""
-    return captured(tmp_path_factory.mktemp("s26"), "grid_s26")
+    return captured(tmp_path_factory.mktemp("s26"), recordings("grid_s26"))
 
 
 @pytest.mark.slow
@@ -69,13 +57,10 @@ def test_lips_follow_the_sound_better_than_any_of_a_thousand_shuffled_pairings(c
 
 
 @pytest.mark.slow
-def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
-    pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.rig.arkit_rig import load_head
+def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus, rig):
     from facesynth.face.rig.markers import LipGap
     from facesynth.face.solve.animate import animate
 
-    rig = load_head()
     alike, off_mm = [], []
     for utterance in list(corpus)[:10]:
         if np.isfinite(utterance.motion.frames).all() and np.isfinite(utterance.motion.head).all():
@@ -88,13 +73,10 @@ def test_the_built_in_head_opens_its_mouth_as_the_talker_does(corpus):
 
 
 @pytest.mark.slow
-def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus):
-    pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.rig.arkit_rig import load_head
+def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus, rig):
     from facesynth.face.rig.markers import LipGap
     from facesynth.face.solve.animate import animate
 
-    rig = load_head()
     least_mm = []
     for utterance in list(corpus)[:10]:
         phones, motion = utterance.speech.phones, utterance.motion
@@ -109,15 +91,13 @@ def test_the_built_in_head_shuts_its_lips_where_the_talker_says_p_b_or_m(corpus)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("talker", ["corpus", "bearded"])
-def test_the_built_in_head_opens_its_mouth_as_far_as_the_talker_does_and_never_crosses_its_lips(talker, request):
+def test_the_built_in_head_opens_its_mouth_as_far_as_the_talker_does_and_never_crosses_its_lips(talker, rig, request):
     """The talker's opening is that of the points over the rest pose, at the head's scale: millimetres, not shape alone."""
-    pytest.importorskip("anny", reason="the head is not installed")
-    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.face.rig.markers import LipGap
     from facesynth.face.solve.animate import animate
     from facesynth.face.solve.fitting import fit_layout
 
-    rig, corpus = load_head(), request.getfixturevalue(talker)
+    corpus = request.getfixturevalue(talker)
     lips, layout = LipGap.of(rig), corpus.layout
     shut_mm = lip_gap(Motion(np.array([layout.neutral], np.float32), 25.0, layout))[0]
     scale = np.linalg.norm(fit_layout(rig, layout).linear[0])

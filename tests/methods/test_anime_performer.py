@@ -5,7 +5,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import lip_gap
 from facesynth.methods.anime_graph.closure import bilabial_spans
 from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
@@ -18,20 +17,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def corpus():
-    from facesynth.performer.build import build_performer
-
-    pytest.importorskip("facesynth.speech.alignment")
-    try:
-        return build_performer("small")
-    except FacesynthError as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="module")
-def split(corpus):
+def split(performer):
     """Sentences to learn from, and others."""
-    return corpus.split(0)
+    return performer.split(0)
 
 
 @pytest.fixture(scope="module")
@@ -39,10 +27,10 @@ def model(split):
     return AnimeGraph().fit(split[0])
 
 
-def test_maps_come_nearer_than_nothing_and_than_the_mean_difference(corpus, model):
-    takes = [take for take in (take_of(u, model.components) for u in corpus) if take is not None]
-    trial = MapTrial(takes, model.split, model.components, corpus.layout)
-    for pair in permutations(corpus.emotions, 2):
+def test_maps_come_nearer_than_nothing_and_than_the_mean_difference(performer, model):
+    takes = [take for take in (take_of(u, model.components) for u in performer) if take is not None]
+    trial = MapTrial(takes, model.split, model.components, performer.layout)
+    for pair in permutations(performer.emotions, 2):
         score = trial.score(*pair, folds=5)
         assert score.sentences >= 15
         assert score.helps("exponential cross-validated"), score

@@ -6,24 +6,16 @@ import torch
 
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
 from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
-from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.search import search
-from facesynth.performer.build import build_performer
-from facesynth.performer.voice import voice_path
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def halves(tmp_path_factory):
-    try:
-        voice_path()
-    except FacesynthError as error:
-        pytest.skip(str(error))
-    corpus = build_performer("small", path=tmp_path_factory.mktemp("performer") / "small")
-    return corpus.split(0)
+def halves(performer):
+    return performer.split(0)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,6 @@ SCRIPT = (Sentence(1, "Stop it right now!"), Sentence(2, "Maybe my mother was ho
 
 @pytest.fixture
 def short_script(rig, voice, monkeypatch):
-    pytest.importorskip("facesynth.speech.alignment")
     monkeypatch.setattr(build, "load_script", lambda _: SCRIPT)
 
 
@@ -34,7 +33,6 @@ def contents(folder):
 @pytest.fixture(scope="module")
 def built(rig, voice, tmp_path_factory):
     """Two sentences, built in two processes."""
-    pytest.importorskip("facesynth.speech.alignment")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "load_script", lambda _: SCRIPT)
         return build_performer("small", path=tmp_path_factory.mktemp("built") / "performer", seed=3, workers=2)
