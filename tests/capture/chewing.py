@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from facesynth.face.texture.warp import sample
+from facesynth.face.texture.warp import places_in, sample
 
 HEIGHT, WIDTH = 120, 160
 BOX = (40, 10, 120, 110)
@@ -25,8 +25,8 @@ def drawn(texture, motion):
         back = np.stack([x, y], axis=-1)
         for _ in range(5):  # the point that comes to lie here: a fixed point, since the motion is gentle
             back = np.stack([x, y], axis=-1) - motion(t, back[..., 0], back[..., 1])
-        offset = torch.from_numpy(back - np.stack([x, y], axis=-1)).float()[None]
-        frames.append(sample(torch.from_numpy(texture)[None, None], offset)[0, 0].numpy())
+        picture = torch.from_numpy(texture)[None, None]
+        frames.append(sample(picture, places_in(picture, torch.from_numpy(back).float()[None]))[0, 0].numpy())
     return np.stack(frames).round().clip(0, 255).astype(np.uint8)
 
 

@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from facesynth.face.texture.mesh import mesh_of, ringed_mesh, signed_areas
-from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+from facesynth.face.texture.warp import PiecewiseAffineWarp, places_in, sample
 from facesynth.inference.errors import FacesynthError
 
 HEIGHT, WIDTH = 48, 64
@@ -121,9 +121,10 @@ def test_outside_the_mesh_nothing_changes(mesh, picture):
 
 
 def test_whole_pixel_displacement_is_a_shift(picture):
-    displacement = torch.zeros(1, HEIGHT, WIDTH, 2)
-    displacement[..., 0] = 3
-    torch.testing.assert_close(sample(picture, displacement)[..., :-3], picture[..., 3:], atol=1e-4, rtol=0)
+    y, x = torch.meshgrid(torch.arange(float(HEIGHT)), torch.arange(float(WIDTH)), indexing="ij")
+    shifted = sample(picture, places_in(picture, torch.stack([x + 3, y], dim=-1)[None]))
+    torch.testing.assert_close(shifted[..., :-3], picture[..., 3:], atol=1e-4, rtol=0)
+    torch.testing.assert_close(shifted[..., -3:], picture[..., -1:].expand(-1, -1, -1, 3), atol=1e-4, rtol=0)
 
 
 def test_folded_triangles_are_counted(mesh):

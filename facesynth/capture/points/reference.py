@@ -106,4 +106,8 @@ class Reference:
 
 def grey(frames: NDArray[np.uint8]) -> Grey:
     """[T, H, W] brightness of pictures [T, H, W, 3]."""
-    return np.stack([(frame @ np.array([0.299, 0.587, 0.114])).round().astype(np.uint8) for frame in frames])
+    import torch
+    from kornia.color import rgb_to_grayscale
+
+    colours = (torch.from_numpy(frame).permute(2, 0, 1).float() for frame in frames)
+    return np.stack([rgb_to_grayscale(picture)[0].round().byte().numpy() for picture in colours])

@@ -15,7 +15,7 @@ from torch import Tensor
 from facesynth.face.texture.mesh import Mesh, ringed_mesh
 from facesynth.face.texture.sources import coherent, nearest
 from facesynth.face.texture.speaker import Speaker, within
-from facesynth.face.texture.warp import PiecewiseAffineWarp, sample
+from facesynth.face.texture.warp import PiecewiseAffineWarp, places_in, sample
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps
 
@@ -103,7 +103,7 @@ class TexturedFace:
         corner = torch.tensor([left, top], device=self.device)
         wanted = torch.from_numpy(target).float().to(self.device) - corner
         there = torch.from_numpy(source).float().to(self.device)
-        values = torch.cat([there - wanted, self._opacity.expand(len(wanted), -1)[:, :, None]], dim=2)
+        values = torch.cat([places_in(pictures, there), self._opacity.expand(len(wanted), -1)[:, :, None]], dim=2)
         drawn = warp.interpolate(wanted, values)
         opacity = drawn[..., 2].clamp(0, 1)
         warped = sample(pictures, drawn[..., :2], "bicubic")

@@ -12,14 +12,12 @@ EDGE = 1e-4
 """px: pixels this far outside a triangle still belong to it, so that rounding leaves no holes along edges."""
 
 
-def filled(vertices: NDArray[Any], values: NDArray[Any], triangles: NDArray[Any], height: int, width: int) -> NDArray[Any]:
-    """Values [N, V, D] at vertices [N, V, 2] (x, y) px, linear in each triangle [F, 3], at every pixel: [N, H, W, D] float32.
+def fill(vertices: NDArray[Any], values: NDArray[Any], triangles: NDArray[Any], out: NDArray[Any]) -> None:
+    """Draw values [N, V, D] at vertices [N, V, 2] (x, y) px, linear in each triangle [F, 3], over `out` [N, H, W, D] float32.
 
-    0 outside the triangles; where they overlap, the last one counts.
+    What lies outside the triangles stays; where they overlap, the last one counts.
     """
-    out = np.zeros((len(vertices), height, width, values.shape[2]), np.float32)
     _fill(vertices.astype(np.float64), values.astype(np.float64), triangles, out)
-    return out
 
 
 @njit(cache=True, nogil=True)

@@ -64,6 +64,7 @@ class Speaker:
         at = np.round(placed - self.corner).astype(np.int64)
         height, width = self.pictures.shape[1:3]
         x, y = np.clip(at[:, :, 0], 0, width - 1), np.clip(at[:, :, 1], 0, height - 1)
+        # kornia reads places in pictures of floats only: all of them turned into floats for 256 places took five times as long.
         grey = self.pictures[np.arange(len(at))[:, None], y, x].mean(axis=2) / 255
         return grey - grey.mean(axis=1, keepdims=True)
 

@@ -1,7 +1,10 @@
 """The piecewise-affine backward warp (Saisan 2004, §5), on any torch device.
 
 Pixel centres are at whole numbers: pixel (row i, column j) is the point x = j, y = i, and a picture of W columns
-reaches from -0.5 to W - 0.5. Sampling is bilinear; outside the picture its nearest border pixel counts.
+reaches from -0.5 to W - 0.5. kornia reads the pixels, at places from -1 (the first pixel) to 1 (the last one). Where to
+read is linear in each triangle; kornia, whose maps are affine, perspective or thin-plate, has none of this kind, so
+that the triangles are filled here. Places are brought to -1 … 1 at the vertices: done by `remap` itself, pixel by pixel,
+that took twice as long as the reading.
 """
 
 from __future__ import annotations
@@ -9,9 +12,11 @@ from __future__ import annotations
 from typing import Literal
 
 import torch
+from kornia.geometry import create_meshgrid, normalize_pixel_coordinates
+from kornia.geometry.transform import remap
 from torch import Tensor, nn
 
-from facesynth.face.texture.filling import EDGE, filled
+from facesynth.face.texture.filling import EDGE, fill
 
 Mode = Literal["bilinear", "bicubic"]
 
@@ -21,30 +26,41 @@ class PiecewiseAffineWarp(nn.Module):
 
     triangles: Tensor
     """[F, 3] vertex numbers."""
+    places: Tensor
+    """[H, W, 2] where each pixel is, -1 … 1: what is outside the mesh is read from there."""
 
     def __init__(self, triangles: Tensor, height: int, width: int) -> None:
         super().__init__()
-        self.register_buffer("triangles", triangles.long())
         self.height, self.width = height, width
+        self.register_buffer("triangles", triangles.long())
+        self.register_buffer("places", create_meshgrid(height, width)[0].contiguous(), persistent=False)
 
     def forward(self, pictures: Tensor, source: Tensor, target: Tensor) -> Tensor:
         """Pictures [N, channels, H, W] with vertices source [N, V, 2] moved to target [N, V, 2] px: [N, channels, H, W].
 
         Outside the target mesh the picture stays as it is.
         """
-        return sample(pictures, self.interpolate(target, source - target))
+        return sample(pictures, self.interpolate(target, places_in(pictures, source), self.places))
 
-    def interpolate(self, vertices: Tensor, values: Tensor) -> Tensor:
-        """Values [N, V, D] at vertices [N, V, 2], linear in each triangle, at every pixel: [N, H, W, D]; 0 outside the mesh.
+    def interpolate(self, vertices: Tensor, values: Tensor, outside: Tensor | None = None) -> Tensor:
+        """Values [N, V, D] at vertices [N, V, 2], linear in each triangle, at every pixel: [N, H, W, D].
 
-        On a processor a compiled loop fills the triangles; on other devices, and where gradients are wanted, torch does.
+        Outside the mesh they are `outside` [H, W, D], or 0. On a processor a compiled loop fills the triangles; on other
+        devices, and where gradients are wanted, torch does.
         """
         if vertices.device.type != "cpu" or vertices.requires_grad or values.requires_grad:
-            return self.interpolate_by_spans(vertices, values)
-        triangles = self.triangles.numpy()
-        return torch.from_numpy(filled(vertices.numpy(), values.numpy(), triangles, self.height, self.width))
+            return self.interpolate_by_spans(vertices, values, outside)
+        drawn = self._undrawn(values, outside)
+        fill(vertices.numpy(), values.numpy(), self.triangles.numpy(), drawn.numpy())
+        return drawn
 
-    def interpolate_by_spans(self, vertices: Tensor, values: Tensor) -> Tensor:
+    def _undrawn(self, values: Tensor, outside: Tensor | None) -> Tensor:
+        """[N, H, W, D] what is seen where there is no mesh."""
+        if outside is None:
+            return values.new_zeros(len(values), self.height, self.width, values.shape[2])
+        return outside.repeat(len(values), 1, 1, 1)
+
+    def interpolate_by_spans(self, vertices: Tensor, values: Tensor, outside: Tensor | None = None) -> Tensor:
         """What `interpolate` gives, in operations of torch alone.
 
         Each triangle is cut into spans of pixels, row by row; a value is linear along a span, so that a pixel costs
@@ -61,9 +77,9 @@ class PiecewiseAffineWarp(nn.Module):
         line = torch.cat([start, slope], dim=1).to(values.dtype).index_select(0, span)
         width = values.shape[-1]
         drawn = torch.addcmul(line[:, :width], line[:, width:], along[:, None].to(values.dtype))
-        out = values.new_zeros(len(vertices) * self.height * self.width, width)
-        out.index_copy_(0, pixel.index_select(0, span) + along, drawn)
-        return out.view(len(vertices), self.height, self.width, width)
+        out = self._undrawn(values, outside)
+        out.view(-1, width).index_copy_(0, pixel.index_select(0, span) + along, drawn)
+        return out
 
     def _spans(self, corners: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Of all triangles [F, 3, 2]: the spans' triangle, row, first column and length, each [S]."""
@@ -78,19 +94,19 @@ class PiecewiseAffineWarp(nn.Module):
         return face, row, first, length
 
 
-def sample(pictures: Tensor, displacement: Tensor, mode: Mode = "bilinear") -> Tensor:
-    """Pictures [N, channels, H, W] read at each pixel plus its displacement [N, h, w, 2] px: [N, channels, h, w].
+def places_in(pictures: Tensor, points: Tensor) -> Tensor:
+    """Points [..., 2] px in pictures [N, channels, H, W] as places, -1 … 1 from the first pixel's centre to the last one's."""
+    return normalize_pixel_coordinates(points, *pictures.shape[-2:])
 
-    Bicubic reading keeps more of what is sharp, and may overshoot the range of the picture.
+
+def sample(pictures: Tensor, places: Tensor, mode: Mode = "bilinear") -> Tensor:
+    """Pictures [N, channels, H, W] read at places [N, h, w, 2], -1 … 1: [N, channels, h, w].
+
+    Outside a picture its nearest border pixel counts. Bicubic reading keeps more of what is sharp, and may overshoot
+    the range of the picture.
     """
-    height, width = pictures.shape[-2:]
-    rows, columns = displacement.shape[1:3]
-    scale = torch.tensor([2 / max(width - 1, 1), 2 / max(height - 1, 1)], device=pictures.device)
-    y, x = torch.meshgrid(
-        torch.arange(rows, device=pictures.device), torch.arange(columns, device=pictures.device), indexing="ij"
-    )
-    grid = (torch.stack([x, y], dim=-1) + displacement) * scale - 1
-    return nn.functional.grid_sample(pictures, grid, mode=mode, padding_mode="border", align_corners=True)
+    x, y = places.unbind(-1)
+    return remap(pictures, x, y, mode=mode, padding_mode="border", align_corners=True, normalized_coordinates=True)
 
 
 def _plane(corners: Tensor, values: Tensor) -> tuple[Tensor, Tensor]:
