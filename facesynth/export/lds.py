@@ -2,45 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import asdict
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder, power_spectrum
 from facesynth.export.folder import Content
-from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.methods.lds.method import LDS, SETTLING_S
-from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE, Periodogram
+from facesynth.export.graph import Graph, Port
+from facesynth.methods.lds.method import LDS
+from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE
 
 
 def lds_content(model: LDS) -> Content:
     """Everything that the runtime needs of a trained system."""
-    periodogram = Periodogram(model.fps, model.config["scale"], model.facts["lead_ms"]["chosen"])
-    length = len(periodogram.window)
-    look_ahead_s = 0.5 / model.fps + periodogram.lead_ms / 1000 + (length - length // 2) / RATE
     return Content(
-        graphs=(features_graph(model, periodogram), innovations_graph(model), rollout_graph(model)),
-        settings={
-            "window_samples": length,
-            "lead_ms": periodogram.lead_ms,
-            "settling_s": SETTLING_S,
-            "features": len(model.features.scale),
-            "components": len(model.shape.scale),
-            "states": len(model.rollout.A),
-        },
+        graphs=(features_graph(model), innovations_graph(model), rollout_graph(model)),
+        settings=asdict(model.settings),
         latency={
-            "look_ahead_s": look_ahead_s,
+            "look_ahead_s": model.runtime().look_ahead_s,
             "about": "frame t is final when the sound up to t / fps + look_ahead_s is known; streaming equals the whole",
         },
         sample_rate=RATE,
     )
 
 
-def features_graph(model: LDS, periodogram: Periodogram) -> Graph:
+def features_graph(model: LDS) -> Graph:
     """Windows of sound [B, T, L] to the periodogram [B, T, 256] and the system's input [B, T, m]."""
-    part, length = model.features, len(periodogram.window)
+    part, periodogram = model.features, model.periodogram
+    length = len(periodogram.window)
     width, each = len(part.scale), periodogram.bins_each
     b = Builder("features")
     windows = b.input("windows", "float32", ("batch", "frames", length))
@@ -61,13 +51,6 @@ def features_graph(model: LDS, periodogram: Periodogram) -> Graph:
     for value, port in zip((power, held), outputs, strict=True):
         b.output(value, port.name, port.dtype, port.shape)
 
-    def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        frames = torch.from_numpy(arrays["windows"])
-        spectrum = torch.fft.rfft(frames * periodogram.window, n=2 * COEFFICIENTS * each).abs().square()
-        spectrum = spectrum[..., bins].reshape(*frames.shape[:-1], COEFFICIENTS, each).mean(dim=-1)
-        wanted = torch.log(spectrum + FLOOR) if periodogram.scale == "log" else spectrum
-        return [wanted.numpy(), part.encode(wanted).numpy()]
-
     return Graph(
         "features",
         "windows of the sound, each centred on its frame, to the input of the system",
@@ -75,7 +58,7 @@ def features_graph(model: LDS, periodogram: Periodogram) -> Graph:
         (Port("windows", "float32", ("batch", "frames", length), "full scale 1", RATE),),
         outputs,
         lambda batch, count, rng: {"windows": (0.1 * rng.standard_normal((batch, count, length))).astype(np.float32)},
-        reference,
+        lambda arrays: model.runtime().features(**arrays),
     )
 
 
@@ -95,11 +78,6 @@ def innovations_graph(model: LDS) -> Graph:
     port = Port("innovations", "float32", ("batch", "frames", p), "standard deviations of the shape", model.fps)
     b.output(b.op("MatMul", sources, b.constant(part.mixing.numpy().T)), port.name, port.dtype, port.shape)
 
-    def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        u = arrays["uniform"].astype(np.float64)
-        v = [np.interp(u[..., i], cumulative[i].astype(np.float64), places[i].astype(np.float64)) for i in range(p)]
-        return [np.stack(v, axis=-1) @ part.mixing.numpy().T.astype(np.float64)]
-
     return Graph(
         "innovations",
         "independent uniform numbers in 0..1 to the noise that drives the system",
@@ -107,7 +85,7 @@ def innovations_graph(model: LDS) -> Graph:
         (Port("uniform", "float32", ("batch", "frames", p), "0..1", model.fps),),
         (port,),
         lambda batch, count, rng: {"uniform": rng.random((batch, count, p)).astype(np.float32)},
-        reference,
+        lambda arrays: model.runtime().innovations(**arrays),
     )
 
 
@@ -139,13 +117,6 @@ def rollout_graph(model: LDS) -> Graph:
     for value, port in zip((frames, after), outputs, strict=True):
         b.output(value, port.name, port.dtype, port.shape)
 
-    def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        rows = zip(*(torch.from_numpy(arrays[port.name]) for port in inputs), strict=True)
-        done = [system(*row) for row in rows]
-        moved = torch.stack([shape.decode(y) for y, _ in done])
-        moved = moved.clamp(0, 1) if layout.kind == "curves" else moved
-        return [moved.numpy(), torch.stack([x for _, x in done]).numpy()]
-
     return Graph(
         "rollout",
         "the system itself, a scan over frames: feed it pieces and hand the state on",
@@ -157,7 +128,7 @@ def rollout_graph(model: LDS) -> Graph:
             "innovations": (0.1 * rng.standard_normal((batch, count, p))).astype(np.float32),
             "state": rng.standard_normal((batch, n)).astype(np.float32),
         },
-        reference,
+        lambda arrays: model.runtime().rollout(**arrays),
     )
 
 

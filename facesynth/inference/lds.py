@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import checked_audio, checked_piece, checked_rate, checked_seed, require_open
 from .errors import FacesynthError, reject_options
-from .folder import Folder
+from .folder import MANIFEST, Folder
 from .graphs import Graph
 from .layout import Layout
 from .motion import Motion
 from .sound import resample
+from .windows import FrameWindows
+
+Part = Callable[..., list[NDArray[Any]]]
 
 MOST_FRAMES = 1024
 """Frames computed at once: memory does not grow with the sound."""
@@ -43,26 +47,62 @@ class LdsState:
         return self.first + len(self.heard)
 
 
-class Lds:
-    """A folder exported from an `lds` model."""
+@dataclass(frozen=True)
+class LdsSettings:
+    """Numbers that a system runs with, as a folder's manifest states them."""
 
-    def __init__(self, folder: Folder, threads: int) -> None:
-        manifest = folder.manifest
-        self.manifest = manifest
-        self.fps, self.rate = float(manifest["fps"]), int(manifest["sample_rate"])
-        self.layout, self.emotions = Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"])
-        self.settings, self._look_ahead_s = folder.settings, float(manifest["latency"]["look_ahead_s"])
-        self._window, self._lead_s = int(self.settings["window_samples"]), float(self.settings["lead_ms"]) / 1000
-        self._settling_s, self._inputs = float(self.settings["settling_s"]), int(self.settings["features"])
-        self._components, self._states = int(self.settings["components"]), int(self.settings["states"])
-        self.features, self.innovations, self.rollout = (
-            Graph(folder, g, threads) for g in ("features", "innovations", "rollout")
-        )
+    window_samples: int
+    """Of the sound heard for one frame."""
+    lead_ms: float
+    """How far the sound is looked ahead."""
+    settling_s: float
+    """How long the noise runs before the first frame, so that it starts as it goes on."""
+    features: int
+    """Of the sound, m."""
+    components: int
+    """Of the shape, p."""
+    states: int
+    """n"""
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Self:
+        """From a manifest's settings, which may hold more."""
+        window, lead_ms, settling_s = int(plain["window_samples"]), float(plain["lead_ms"]), float(plain["settling_s"])
+        return cls(window, lead_ms, settling_s, int(plain["features"]), int(plain["components"]), int(plain["states"]))
+
+    def windows(self, fps: float, rate: int) -> FrameWindows:
+        """Of sound at a rate in Hz, for frames at `fps`."""
+        return FrameWindows(fps, rate, self.window_samples, self.lead_ms / 1000)
+
+
+class Lds:
+    """A trained system, whether its parts are graphs of a folder or modules of torch.
+
+    Parts are called with named arrays: `features(windows [1, T, L])` gives the periodogram and the input [1, T, m],
+    `innovations(uniform [1, T, p])` the noise [1, T, p], `rollout(features, innovations, state [1, n])` the frames
+    [1, T, C] and the state after them.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        emotions: tuple[str, ...],
+        windows: FrameWindows,
+        settings: LdsSettings,
+        *,
+        features: Part,
+        innovations: Part,
+        rollout: Part,
+        manifest: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        self.layout, self.emotions, self.windows, self.settings = layout, emotions, windows, settings
+        self.features, self.innovations, self.rollout = features, innovations, rollout
+        self.fps, self.rate, self.manifest = windows.fps, windows.rate, manifest
 
     @property
     def look_ahead_s(self) -> float:
         """Frame t waits for the sound up to t / fps + this, seconds."""
-        return self._look_ahead_s
+        return self.windows.look_ahead_s
 
     def synthesize(self, speech: Any, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
         """Motion for speech, of which only the sound counts; `noise` 1 as recorded, 0 the deterministic part alone."""
@@ -78,16 +118,17 @@ class Lds:
         if not (np.isfinite(noise) and noise >= 0):
             raise FacesynthError(f"noise is {noise}; wanted 0 (none), 1 (as recorded) or another number that is not negative")
         rng = np.random.default_rng(checked_seed(seed))
-        count = round(self._settling_s * self.fps)
-        no_sound = np.zeros((1, count, self._inputs), np.float32)
-        rest = np.zeros((1, self._states), np.float32)
+        count = round(self.settings.settling_s * self.fps)
+        no_sound = np.zeros((1, count, self.settings.features), np.float32)
+        rest = np.zeros((1, self.settings.states), np.float32)
         _, system = self.rollout(features=no_sound, innovations=self._draw(rng, count, noise), state=rest)
         return LdsState(system, np.zeros(0, np.float32), 0, 0, noise, rng.bit_generator.state)
 
     def advance(self, state: LdsState, audio: ArrayLike) -> tuple[NDArray[np.float32], LdsState]:
         """More sound [S] at the model's rate: the frames [t, C] that became final, possibly none, and the state after them."""
         state = replace(state, heard=np.concatenate([state.heard, checked_piece(audio)]))
-        ready = int(np.searchsorted(self._stops(state.frames, self._most(state)), state.samples, side="right"))
+        stops = self.windows.starts(state.frames, self._most(state)) + self.windows.length
+        ready = int(np.searchsorted(stops, state.samples, side="right"))
         return self._frames(state, min(state.frames + ready, self._most(state)))
 
     def finish(self, state: LdsState) -> tuple[NDArray[np.float32], LdsState]:
@@ -103,42 +144,25 @@ class Lds:
         """Frames of the sound so far."""
         return round(state.samples / self.rate * self.fps)
 
-    def _starts(self, first: int, stop: int) -> NDArray[np.int64]:
-        """[stop - first] first sample of each frame's window, counted from the start of the sound."""
-        times_s = (np.arange(first, max(first, stop)) + 0.5) / self.fps + self._lead_s
-        return np.round(times_s * self.rate).astype(np.int64) - self._window // 2
-
-    def _stops(self, first: int, stop: int) -> NDArray[np.int64]:
-        return self._starts(first, stop) + self._window
-
     def _frames(self, state: LdsState, stop: int) -> tuple[NDArray[np.float32], LdsState]:
         """Frames from the state's next up to `stop`; sound that is not there is silence."""
-        done = [np.zeros((0, self.layout.dimension * len(self.layout.names)), np.float32)]
+        done = [np.zeros((0, self.layout.channels), np.float32)]
         rng = np.random.default_rng(0)
         rng.bit_generator.state = state.random
         system = state.system
         for first in range(state.frames, stop, MOST_FRAMES):
             last = min(first + MOST_FRAMES, stop)
-            _, features = self.features(windows=self._windows(state, first, last))
+            _, features = self.features(windows=self.windows.cut(state.heard, state.first, first, last)[None])
             frames, system = self.rollout(features=features, innovations=self._draw(rng, last - first, state.noise), state=system)
             done.append(frames[0])
         stop = max(stop, state.frames)
-        kept = int(np.clip(self._starts(stop, stop + 1)[0] - state.first, 0, len(state.heard)))
+        kept = int(np.clip(self.windows.starts(stop, stop + 1)[0] - state.first, 0, len(state.heard)))
         heard, first_kept = state.heard[kept:], state.first + kept
         return np.concatenate(done), LdsState(system, heard, first_kept, stop, state.noise, rng.bit_generator.state)
 
-    def _windows(self, state: LdsState, first: int, stop: int) -> NDArray[np.float32]:
-        """[1, T, L]"""
-        length = self._window
-        starts = self._starts(first, stop) - state.first
-        before, after = max(0, -int(starts[0])), max(0, int(starts[-1]) + length - len(state.heard))
-        low = max(0, int(starts[0]))
-        sound = np.pad(state.heard[low : max(low, int(starts[-1]) + length)], (before, after))
-        return sound[(starts - starts[0])[:, None] + np.arange(length)][None]
-
     def _draw(self, rng: np.random.Generator, count: int, noise: float) -> NDArray[np.float32]:
         """[1, count, p]"""
-        uniform = rng.random((count, self._components)).astype(np.float32)[None]
+        uniform = rng.random((count, self.settings.components)).astype(np.float32)[None]
         return np.float32(noise) * self.innovations(uniform=uniform)[0]
 
 
@@ -160,3 +184,17 @@ class LdsStream:
         self._ended = True
         frames, self.state = self.model.finish(self.state)
         return frames
+
+
+def open_lds(folder: Folder, threads: int) -> Lds:
+    """The system that an `lds` model was exported to."""
+    manifest, settings = folder.manifest, LdsSettings.from_dict(folder.settings)
+    windows = settings.windows(float(manifest["fps"]), int(manifest["sample_rate"]))
+    stated_s = float(manifest["latency"]["look_ahead_s"])
+    if abs(stated_s - windows.look_ahead_s) > 1 / windows.rate:
+        raise FacesynthError(
+            f"{folder.path / MANIFEST} states a look-ahead of {stated_s:g} s, and windows that reach "
+            f"{windows.look_ahead_s:g} s ahead; export the model again"
+        )
+    graphs = {name: Graph(folder, name, threads) for name in ("features", "innovations", "rollout")}
+    return Lds(Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"]), windows, settings, manifest=manifest, **graphs)

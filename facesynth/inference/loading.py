@@ -10,7 +10,7 @@ from .errors import FacesynthError, unknown
 from .folder import open_folder, stated_by_manifest
 
 _MODELS = {
-    "lds": ".lds:Lds",
+    "lds": ".lds:open_lds",
     "emotion": ".emotion:EmotionDetector",
     "efase": ".efase:Efase",
     "anime_graph": ".anime_graph:AnimeGraph",

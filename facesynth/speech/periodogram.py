@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
+from facesynth.inference.windows import FrameWindows
 
 Scale = Literal["linear", "log"]
 RATE = 16_000
@@ -28,9 +29,8 @@ FLOOR = 1e-7
 class Periodogram(nn.Module):
     """256 coefficients of the power spectrum for each video frame (Saisan 2004, §5).
 
-    Frame t shows what happens from t / fps to (t + 1) / fps. Its window, as long as that frame and at least 32 ms,
-    is centred on the middle of it, `lead_ms` later, since lips move before the sound is heard. The centre is
-    `round((t + 1/2) RATE / fps + lead)`, never a sum of rounded hops: the clocks stay together for any fps.
+    Frame t shows what happens from t / fps to (t + 1) / fps. Its window is as long as that frame and at least 32 ms,
+    and lies where `FrameWindows` says.
     """
 
     window: Tensor
@@ -48,23 +48,31 @@ class Periodogram(nn.Module):
         self.register_buffer("window", (window / window.square().sum().sqrt()).float())
         self.bins_each = math.ceil(length / (2 * COEFFICIENTS))
 
+    @property
+    def windows(self) -> FrameWindows:
+        """Where the windows lie."""
+        return FrameWindows(self.fps, RATE, len(self.window), self.lead_ms / 1000)
+
     def centres(self, count: int) -> Tensor:
         """[count] sample at the middle of each frame's window, counted at 16 kHz."""
-        times_s = (torch.arange(count, dtype=torch.float64) + 0.5) / self.fps + self.lead_ms / 1000
-        return torch.round(times_s * RATE).long()
+        return torch.from_numpy(self.windows.starts(0, count)) + len(self.window) // 2
 
     def forward(self, audio: Tensor, count: int) -> Tensor:
-        """Coefficients [count, 256] of sound [S] at 16 kHz, which is silent before its start and after its end.
-
-        Windows longer than 32 ms resolve more than 256 bins; neighbours are averaged down to 256.
-        """
+        """Coefficients [count, 256] of sound [S] at 16 kHz, which is silent before its start and after its end."""
         length = len(self.window)
         starts = self.centres(count).to(audio.device) - length // 2
         before = int((-starts[0]).clamp(min=0))
         after = int((starts[-1] + length - len(audio)).clamp(min=0))
-        frames = nn.functional.pad(audio, (before, after))[(starts + before)[:, None] + torch.arange(length, device=audio.device)]
+        places = (starts + before)[:, None] + torch.arange(length, device=audio.device)
+        return self.spectrum(nn.functional.pad(audio, (before, after))[places])
+
+    def spectrum(self, frames: Tensor) -> Tensor:
+        """Coefficients [..., 256] of windows [..., L].
+
+        Windows longer than 32 ms resolve more than 256 bins; neighbours are averaged down to 256.
+        """
         power = torch.fft.rfft(frames * self.window, n=2 * COEFFICIENTS * self.bins_each).abs().square()
-        power = power[:, 1 : 1 + COEFFICIENTS * self.bins_each].reshape(count, COEFFICIENTS, self.bins_each).mean(dim=2)
+        power = power[..., 1 : 1 + COEFFICIENTS * self.bins_each].unflatten(-1, (COEFFICIENTS, self.bins_each)).mean(dim=-1)
         return power if self.scale == "linear" else torch.log(power + FLOOR)
 
     def of(self, speech: Speech, count: int) -> Tensor:

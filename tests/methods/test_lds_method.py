@@ -113,9 +113,9 @@ def test_frame_by_frame_is_the_whole(model):
     whole, last = model.rollout(u, e, model.rollout.rest())
     state, frames = model.rollout.rest(), []
     for one_u, one_e in zip(u, e, strict=True):
-        frame, state = model.rollout.step(one_u, one_e, state)
+        frame, state = model.rollout(one_u[None], one_e[None], state)
         frames.append(frame)
-    torch.testing.assert_close(torch.stack(frames), whole, atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(torch.cat(frames), whole, atol=1e-5, rtol=1e-5)
     torch.testing.assert_close(state, last, atol=1e-5, rtol=1e-5)
     first, state = model.rollout(u[:20], e[:20], model.rollout.rest())
     second, _ = model.rollout(u[20:], e[20:], state)
@@ -138,7 +138,7 @@ def test_drawn_innovations_have_the_moments_of_the_recorded():
     mixing = rng.normal(size=(3, 3))
     e = rng.laplace(scale=np.sqrt(0.5), size=(20_000, 3)) @ mixing.T
     learned = Innovations.fit(e)
-    drawn = learned.draw(20_000, np.random.default_rng(1)).double().numpy()
+    drawn = learned(torch.from_numpy(np.random.default_rng(1).random((20_000, 3))).float()).double().numpy()
     assert learned.independent
     np.testing.assert_allclose(np.cov(drawn.T), np.cov(e.T), atol=0.1 * np.cov(e.T).max())
     assert (learned.kurtosis > 2).all()
@@ -147,7 +147,8 @@ def test_drawn_innovations_have_the_moments_of_the_recorded():
 def test_drawn_innovations_have_no_mean():
     rng = np.random.default_rng(0)
     e = rng.exponential(size=(900, 2)) ** 2  # heavy on one side: wide bins, and a mean that is not zero
-    drawn = Innovations.fit(e).draw(200_000, np.random.default_rng(1)).double().numpy()
+    uniform = torch.from_numpy(np.random.default_rng(1).random((200_000, 2))).float()
+    drawn = Innovations.fit(e)(uniform).double().numpy()
     assert np.abs(drawn.mean(axis=0)).max() < 0.02 * e.std()
 
 

@@ -61,12 +61,14 @@ class Innovations(nn.Module):
         arrays = (mixing, edges, cumulative, kurtosis)
         return cls(*(torch.from_numpy(array.astype(np.float32)) for array in arrays), independent=independent)
 
-    def draw(self, count: int, rng: np.random.Generator) -> Tensor:
-        """Innovations e [count, p]: each source by the inverse of its cumulative histogram."""
-        uniform = rng.random((count, len(self.mixing)))
-        edges, cumulative = self.edges.cpu().double().numpy(), self.cumulative.cpu().double().numpy()
-        v = np.stack([np.interp(uniform[:, i], cumulative[i], edges[i]) for i in range(len(edges))], axis=1)
-        return torch.from_numpy(v.astype(np.float32)).to(self.mixing.device) @ self.mixing.T
+    def forward(self, uniform: Tensor) -> Tensor:
+        """Numbers [..., T, p] drawn evenly from 0..1 to innovations e: each source by the inverse of its cumulative histogram."""
+        drawn = uniform.reshape(-1, len(self.mixing)).T.contiguous()  # [p, N]
+        step = torch.searchsorted(self.cumulative, drawn, right=True).clamp(1, self.cumulative.shape[1] - 1)
+        below, rise = self.cumulative.gather(1, step - 1), self.cumulative.diff(dim=1).gather(1, step - 1)
+        left, width = self.edges.gather(1, step - 1), self.edges.diff(dim=1).gather(1, step - 1)
+        v = left + (drawn - below) / rise.clamp(min=torch.finfo(drawn.dtype).tiny) * width
+        return v.T.reshape(uniform.shape) @ self.mixing.T
 
 
 def innovations_of(signals: Sequence[Array], noise: Stochastic, burn_in: int) -> Array:

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lds import Lds, LdsSettings, LdsStream
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.lds.capabilities import CAPABILITIES
@@ -21,8 +22,9 @@ from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, plain
 from facesynth.methods.lds.system import Array, Clip, LinearSystem
 from facesynth.methods.method import Method
+from facesynth.methods.parts import part
 from facesynth.methods.registry import register
-from facesynth.speech.periodogram import Periodogram, Scale
+from facesynth.speech.periodogram import RATE, Periodogram, Scale
 
 SETTLING_S = 4.0
 """How long the noise runs before the first frame, so that it starts as it goes on."""
@@ -101,35 +103,56 @@ class LDS(Method):
         }
         return self
 
-    @torch.no_grad()
     def synthesize(self, speech: Speech, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
         """Motion for new speech, of which only the sound counts: this model knows neither phones nor emotions.
 
         `noise` scales the innovations: 1 as recorded, 0 for the deterministic part alone.
         """
-        layout = self.fitted_layout
-        if options:
-            raise FacesynthError(f"lds knows the options seed and noise; got {', '.join(sorted(options))}")
-        if not (np.isfinite(noise) and noise >= 0):
-            raise FacesynthError(f"noise must be 0 (none), 1 (as recorded) or another number that is not negative; got {noise}")
-        count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
-        e, settled = self.draw(count, noise, seed)
-        shape, _ = self.rollout(self.encode(speech, count), e, settled)
+        return self.runtime().synthesize(speech, seed=seed, noise=noise, **options)
+
+    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream:
+        """Sound in pieces of any size, frames as soon as they are final; `sample_rate` must be that of the periodogram."""
+        return self.runtime().stream(seed=seed, noise=noise, sample_rate=sample_rate)
+
+    def runtime(self) -> Lds:
+        """The model that speaks: what an exported folder is, with these modules for its graphs."""
+        layout, device, settings = self.fitted_layout, self.rollout.A.device, self.settings
+        return Lds(
+            layout,
+            self.emotions,
+            settings.windows(self.fps, RATE),
+            settings,
+            features=part(self.features_of, device),
+            innovations=part(lambda uniform: (self.innovations(uniform),), device),
+            rollout=part(self.frames_of, device),
+        )
+
+    @property
+    def settings(self) -> LdsSettings:
+        """Sizes and times of the trained system."""
+        features, components, states = len(self.features.scale), len(self.shape.scale), len(self.rollout.A)
+        return LdsSettings(len(self.periodogram.window), self.periodogram.lead_ms, SETTLING_S, features, components, states)
+
+    @property
+    def periodogram(self) -> Periodogram:
+        """How the sound is heard, with the lead that was chosen."""
+        periodogram = Periodogram(self.fps, self.config["scale"], self.facts["lead_ms"]["chosen"])
+        return periodogram.to(self.features.scale.device)
+
+    def features_of(self, windows: Tensor) -> tuple[Tensor, Tensor]:
+        """Windows of sound [..., T, L] to the periodogram [..., T, 256] and the system's input [..., T, m]."""
+        power = self.periodogram.spectrum(windows)
+        return power, self.features.encode(power)
+
+    def frames_of(self, features: Tensor, innovations: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Features [..., T, m], innovations [..., T, p] and a state [..., n] to frames [..., T, C] and the state after them."""
+        shape, after = self.rollout(features, innovations, state)
         frames = self.shape.decode(shape)
-        return Motion((frames.clamp(0, 1) if layout.kind == "curves" else frames).cpu().numpy(), self.fps, layout)
+        return (frames.clamp(0, 1) if self.fitted_layout.kind == "curves" else frames), after
 
     def encode(self, speech: Speech, count: int) -> Tensor:
         """The system's input [count, m] for an utterance."""
-        periodogram = Periodogram(self.fps, self.config["scale"], self.facts["lead_ms"]["chosen"])
-        return self.features.encode(periodogram.of(speech, count).to(self.features.scale.device))
-
-    def draw(self, count: int, noise: float, seed: int) -> tuple[Tensor, Tensor]:
-        """Innovations [count, p], and the state [n] that the noise has reached before the first frame."""
-        settling = round(SETTLING_S * self.fps)
-        e = noise * self.innovations.draw(settling + count, np.random.default_rng(seed))
-        no_sound = e.new_zeros(settling, self.rollout.B.shape[1] - e.shape[1])
-        _, state = self.rollout(no_sound, e[:settling], self.rollout.rest())
-        return e[settling:], state
+        return self.features.encode(self.periodogram.of(speech, count))
 
     def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
         sounds = periodograms(pieces, Periodogram(self.fps, self.config["scale"], lead_ms))

@@ -46,20 +46,14 @@ class Rollout(nn.Module):
         """[n] the state of a face whose inputs have been average for long: zero."""
         return self.A.new_zeros(len(self.A))
 
-    def step(self, u: Tensor, e: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """One frame: features [m], innovation [p], state [n] to shape [p] and the next state [n]."""
-        drive = torch.cat([u, e])
-        return self.C @ state + self.D @ drive, self.A @ state + self.B @ drive
-
     def forward(self, u: Tensor, e: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Features [T, m], innovations [T, p], first state [n] to shapes [T, p] and the state after them [n].
+        """Features [..., T, m], innovations [..., T, p], first state [..., n] to shapes [..., T, p] and the state after them.
 
         Feeding it the frames in pieces, the state handed on, gives what feeding them at once gives.
         """
-        drive = torch.cat([u, e], dim=1)
-        pushes = drive @ self.B.T
-        states = []
-        for push in pushes:
+        drive = torch.cat([u, e], dim=-1)
+        onward, states = self.A.T, []
+        for push in (drive @ self.B.T).unbind(-2):
             states.append(state)
-            state = torch.addmv(push, self.A, state)
-        return torch.stack(states) @ self.C.T + drive @ self.D.T, state
+            state = push + state @ onward
+        return torch.stack(states, dim=-2) @ self.C.T + drive @ self.D.T, state
