@@ -10,8 +10,9 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
-from facesynth.methods.baselines.ridge import ALPHAS, Moments, Ridge
+from facesynth.methods.baselines.ridge import ALPHAS, Ridge
 from facesynth.methods.baselines.tcn import Tcn
+from facesynth.methods.learn.regression import Moments
 
 METHODS = {"mean_face": MeanFace, "phone_mean": PhoneMean, "ridge": Ridge, "tcn": lambda: Tcn(steps=80)}
 QUICK = METHODS | {"tcn": lambda: Tcn(steps=3)}
@@ -157,7 +158,7 @@ def test_ridge_solves_its_normal_equations():
     for part in np.array_split(np.arange(500), 4):
         moments.add(x[part], y[part])
     centred = x - x.mean(axis=0)
-    for alpha, (weights, bias) in zip(ALPHAS, moments.solutions(), strict=True):
+    for alpha, (weights, bias) in zip(ALPHAS, moments.solutions(ALPHAS), strict=True):
         penalty = alpha * 500 * centred.var(axis=0).mean()
         expected = np.linalg.solve(centred.T @ centred + penalty * np.eye(7), centred.T @ (y - y.mean(axis=0)))
         assert weights == pytest.approx(expected, abs=1e-4)

@@ -17,6 +17,8 @@ from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.innovations import Innovations
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.orders import folds, plainest_good
+from facesynth.methods.lds.plots import plot_innovations, plot_orders
+from facesynth.methods.lds.prediction import innovations, one_step
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.system import Clip
 from facesynth.methods.registry import load
@@ -161,6 +163,33 @@ def test_silence_holds_still_and_stays_among_what_was_seen(corpus, model):
     assert (frames > seen.min(axis=0) - margin).all()
     assert (frames < seen.max(axis=0) + margin).all()
     assert np.abs(np.diff(frames[-10:], axis=0)).max() < 0.1
+
+
+def test_innovations_of_the_whole_system_are_those_that_drove_it():
+    from simulated_lds import random_truth
+
+    truth = random_truth(0)
+    rng = np.random.default_rng(0)
+    u, e = torch.from_numpy(rng.normal(size=(200, 2))), torch.from_numpy(rng.normal(size=(200, 3)))
+    rollout = Rollout.of(truth.deterministic, truth.stochastic).double()
+    y, _ = rollout(u, e, rollout.rest())
+    torch.testing.assert_close(innovations(rollout, u, y), e)
+
+
+def test_prediction_needs_whole_frames(driven):
+    model = LDS(**{**QUICK, "features": 2, "components": 2, "rows": 4}).fit(driven)
+    utterance = driven["c00"]
+    with pytest.raises(FacesynthError, match="without gaps"):
+        one_step(model, utterance.speech, np.full_like(utterance.motion.frames, np.nan))
+
+
+def test_what_was_identified_is_drawn(driven, tmp_path):
+    pytest.importorskip("matplotlib")
+    model = LDS(**{**QUICK, "features": 2, "components": 2, "rows": 4, "stochastic_order": "auto"}).fit(driven)
+    for draw, name in ((plot_orders, "orders.png"), (plot_innovations, "innovations.png")):
+        draw(model, tmp_path / name)
+        assert (tmp_path / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+        assert (tmp_path / name).stat().st_size > 10_000
 
 
 def test_folds_keep_sentences_together():

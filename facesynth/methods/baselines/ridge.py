@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
@@ -17,6 +15,7 @@ from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import RIDGE
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
 from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
@@ -59,9 +58,9 @@ class Ridge(Method):
         self.hearing.learn(corpus)
         parts = self._moments(corpus, held_out)
         together = parts[0] + parts[1]
-        errors = [parts[1].error(*weights) for weights in parts[0].solutions()]
+        errors = [parts[1].error(*weights) for weights in parts[0].solutions(ALPHAS)]
         best = int(np.argmin(errors))
-        weights, bias = together.solutions()[best]
+        weights, bias = together.solutions(ALPHAS)[best]
         self.weights, self.bias = torch.from_numpy(weights).float(), torch.from_numpy(bias).float()
         self.facts = {"alpha": float(ALPHAS[best]), "held_out_rms": float(np.sqrt(errors[best]))}
         return self.eval()
@@ -88,49 +87,6 @@ class Ridge(Method):
             moved = self.pca.encode(torch.from_numpy(utterance.motion.frames[present]))
             parts[utterance.sentence in held_out].add(heard.numpy(), moved.numpy())
         return parts
-
-
-@dataclass
-class Moments:
-    """Sums of x [N, I], y [N, O] and their products: all that least squares needs, whatever N is."""
-
-    count: int
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    xx: NDArray[np.float64]
-    xy: NDArray[np.float64]
-    yy: float
-
-    @classmethod
-    def zero(cls, inputs: int, outputs: int) -> Self:
-        """Of no samples."""
-        return cls(0, np.zeros(inputs), np.zeros(outputs), np.zeros((inputs, inputs)), np.zeros((inputs, outputs)), 0.0)
-
-    def add(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> None:
-        """Count samples x [N, I], y [N, O]; products in float32, which standardised inputs bear, sums in float64."""
-        self.count += len(x)
-        self.x += x.sum(axis=0, dtype=np.float64)
-        self.y += y.sum(axis=0, dtype=np.float64)
-        self.xx += x.T @ x
-        self.xy += x.T @ y
-        self.yy += float(np.square(y, dtype=np.float64).sum())
-
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(*(getattr(self, name) + getattr(other, name) for name in ("count", "x", "y", "xx", "xy", "yy")))
-
-    def solutions(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Weights [I, O] and bias [O] for each of ALPHAS, from one eigendecomposition of the covariance."""
-        x, y = self.x / self.count, self.y / self.count
-        variance, directions = np.linalg.eigh(self.xx / self.count - np.outer(x, x))
-        along = directions.T @ (self.xy / self.count - np.outer(x, y))
-        scale = variance.clip(min=0).mean()
-        weights = [directions @ (along / (variance.clip(min=0) + alpha * scale)[:, None]) for alpha in ALPHAS]
-        return [(w, y - x @ w) for w in weights]
-
-    def error(self, weights: NDArray[np.float64], bias: NDArray[np.float64]) -> float:
-        """Mean over the samples of ‖x W + b - y‖²."""
-        predicted = np.sum(weights * (self.xx @ weights)) + 2 * self.x @ weights @ bias + self.count * bias @ bias
-        return float((predicted - 2 * np.sum(weights * self.xy) - 2 * self.y @ bias + self.yy) / self.count)
 
 
 def _held_out(corpus: Corpus, seed: int) -> frozenset[str]:

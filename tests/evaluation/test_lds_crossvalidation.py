@@ -1,17 +1,11 @@
 import numpy as np
 import pytest
-from simulated_lds import random_truth
 
 from facesynth.corpus import Corpus, Record
-from facesynth.inference.errors import FacesynthError
+from facesynth.evaluation.lds_crossvalidation import Errors, cross_validate, table
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.lds.crossvalidation import Errors, cross_validate, table
-from facesynth.methods.lds.method import LDS
-from facesynth.methods.lds.plots import plot_innovations, plot_orders
-from facesynth.methods.lds.prediction import innovations, one_step
-from facesynth.methods.lds.rollout import Rollout
 
 QUICK = {"features": 2, "components": 2, "rows": 4, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
 
@@ -85,30 +79,3 @@ def test_errors_are_what_they_are_called():
     whole, centred = errors.rows()["row"]
     assert whole == pytest.approx(np.sqrt(2 / 3))
     assert centred == pytest.approx(0)
-
-
-def test_innovations_of_the_whole_system_are_those_that_drove_it():
-    import torch
-
-    truth = random_truth(0)
-    rng = np.random.default_rng(0)
-    u, e = torch.from_numpy(rng.normal(size=(200, 2))), torch.from_numpy(rng.normal(size=(200, 3)))
-    rollout = Rollout.of(truth.deterministic, truth.stochastic).double()
-    y, _ = rollout(u, e, rollout.rest())
-    torch.testing.assert_close(innovations(rollout, u, y), e)
-
-
-def test_prediction_needs_whole_frames(driven):
-    model = LDS(**QUICK).fit(driven)
-    utterance = driven["c0"]
-    with pytest.raises(FacesynthError, match="without gaps"):
-        one_step(model, utterance.speech, np.full_like(utterance.motion.frames, np.nan))
-
-
-def test_what_was_identified_is_drawn(driven, tmp_path):
-    pytest.importorskip("matplotlib")
-    model = LDS(**{**QUICK, "stochastic_order": "auto"}).fit(driven)
-    for draw, name in ((plot_orders, "orders.png"), (plot_innovations, "innovations.png")):
-        draw(model, tmp_path / name)
-        assert (tmp_path / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-        assert (tmp_path / name).stat().st_size > 10_000

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.motion import Motion
-from facesynth.methods.baselines.mean_face import MeanFace
-from facesynth.methods.baselines.ridge import Moments, Ridge
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.prediction import one_step
+from facesynth.methods.learn.frames import complete
+from facesynth.methods.learn.regression import Moments
+from facesynth.methods.registry import create
 
 SAMPLES = 10
 PENALTY = 1e-3
@@ -68,7 +69,7 @@ def cross_validate(corpus: Corpus, configs: Mapping[str, Mapping[str, Any]], fol
 
 def judge_fold(errors: Errors, configs: Mapping[str, Mapping[str, Any]], train: Corpus, test: Corpus, seed: int = 0) -> None:
     """What `cross_validate` does with one fold, added to `errors`."""
-    mean, mel = MeanFace().fit(train), Ridge().fit(train, seed=seed)
+    mean, mel = create("mean_face").fit(train), create("ridge").fit(train, seed=seed)
     for utterance in test:
         errors.add("mean shape", _frames(mean.synthesize(utterance.speech)), _frames(utterance.motion))
         errors.add("ridge, log-mel", _frames(mel.synthesize(utterance.speech)), _frames(utterance.motion))
@@ -125,14 +126,11 @@ def _ridge(model: LDS, train: Corpus) -> Callable[[Utterance], Frames]:
     """Linear regression from the system's features of a frame to the frame."""
     moments = Moments.zero(len(model.features.scale), train.layout.channels)
     for utterance in train:
-        present = ~np.isnan(utterance.motion.frames).any(axis=1)
-        heard = model.encode(utterance.speech, len(utterance.motion)).numpy()
+        present = complete(utterance.motion.frames)
+        heard = model.encode(utterance.speech, len(utterance.motion)).cpu().numpy()
         moments.add(heard[present], utterance.motion.frames[present])
-    x, y = moments.x / moments.count, moments.y / moments.count
-    covariance = moments.xx / moments.count - np.outer(x, x)
-    penalty = PENALTY * np.trace(covariance) / len(x) * np.eye(len(x))
-    weights = np.linalg.solve(covariance + penalty, moments.xy / moments.count - np.outer(x, y))
-    return lambda utterance: (model.encode(utterance.speech, len(utterance.motion)).double().numpy() - x) @ weights + y
+    weights, bias = moments.solutions([PENALTY])[0]
+    return lambda utterance: model.encode(utterance.speech, len(utterance.motion)).double().cpu().numpy() @ weights + bias
 
 
 def _frames(motion: Motion) -> Frames:
