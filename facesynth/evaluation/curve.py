@@ -20,9 +20,9 @@ from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, lve_centred
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
 from facesynth.evaluation.regions import lip_points
+from facesynth.inference.filters import sharpen
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.methods.efase.sharpening import sharpen
 
 LIVELY = (0.9, 1.1)
 """Energy ratios that count as neither smoothed away nor invented."""

@@ -9,27 +9,36 @@ Floats = NDArray[np.float64]
 
 PASS, ORDER = 0.9, 6
 """Movement up to this share of the new rate's Nyquist frequency is kept when a rate falls, by a Butterworth filter."""
-QUICK_S, ROUGH_S = 0.08, 0.02
-"""Movement between these is raised by `sharpen`; what is quicker is smoothed away."""
+QUICK_S = 0.08
+"""Standard deviation of the smoothing that parts slow movement from quick."""
+ROUGH_S = 0.02
+"""What is quicker than this is joints and the noise of sensors: it is smoothed away, not raised."""
 
 
 def gaussian(signal: Floats, sigma: float) -> Floats:
-    """A signal [T] smoothed with a Gaussian of `sigma` frames, cut at four of them; the ends are held."""
+    """A signal [T] or [T, C] smoothed with a Gaussian of `sigma` frames, cut at four of them; the ends are held."""
+    if signal.ndim > 1:
+        return np.stack([gaussian(column, sigma) for column in signal.T], axis=1)
     reach = int(4 * sigma + 0.5)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     return np.convolve(np.pad(signal, reach, mode="edge"), weights / weights.sum(), mode="valid")
 
 
 def sharpen(frames: Floats, share: float, fps: float) -> Floats:
-    """Frames [T, D] with what they have of quick movement raised by a share; 0 leaves them as they are."""
+    """`y + share (y - slow y)`, y the frames [T, D] without roughness; share 0 leaves them as they are.
+
+    Nothing new is made up, and a pose that is held stays. Raised as well, the roughness would double the jerk of
+    natural motion; this way both the energy and the jerk of a mean come near those of recordings.
+    """
     if share == 0:
         return frames
-    smooth = _each(frames, ROUGH_S * fps)
-    return smooth + share * (smooth - _each(smooth, QUICK_S * fps))
+    smooth = without_roughness(frames, fps)
+    return smooth + share * (smooth - gaussian(smooth, QUICK_S * fps))
 
 
-def _each(frames: Floats, sigma: float) -> Floats:
-    return np.stack([gaussian(column, sigma) for column in frames.T], axis=1)
+def without_roughness(frames: Floats, fps: float) -> Floats:
+    """Frames [T, C] without what is quicker than ROUGH_S."""
+    return gaussian(frames, ROUGH_S * fps)
 
 
 def butterworth(order: int, cutoff: ArrayLike) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,3 +20,30 @@ def time_warp(frames: NDArray[Any], count: int) -> NDArray[Any]:
     low = np.minimum(at.astype(np.int64), max(length - 2, 0))
     share = (at - low).reshape(-1, *[1] * (frames.ndim - 1)).astype(frames.dtype)
     return frames[low] * (1 - share) + frames[np.minimum(low + 1, length - 1)] * share
+
+
+class Pieces(Protocol):
+    """Nodes of any database: node n moves through `frames[starts[n] : starts[n] + lengths[n]]`."""
+
+    @property
+    def frames(self) -> NDArray[np.floating[Any]]:
+        """[F, D]"""
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """[N]"""
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """[N] in frames."""
+
+
+def stretched(nodes: Pieces, which: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """[n, count, D] the motions of the nodes `which`, each as `time_warp` brings it to `count` frames."""
+    lengths = nodes.lengths[which]
+    share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)
+    at = np.where(np.equal(lengths, count)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
+    low = np.minimum(at.astype(np.int64), np.maximum(lengths - 2, 0)[:, None])
+    high = np.minimum(low + 1, (lengths - 1)[:, None])
+    part, first = (at - low)[..., None], nodes.starts[which][:, None]
+    return np.asarray(nodes.frames[first + low] * (1 - part) + nodes.frames[first + high] * part)

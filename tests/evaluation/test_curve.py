@@ -13,9 +13,9 @@ from facesynth.evaluation.curve_figure import curve_figure, highest_shown
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.figures import colour_of
 from facesynth.evaluation.geometry import lve, lve_centred
+from facesynth.inference.filters import sharpen
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
-from facesynth.methods.efase.sharpening import sharpen
 
 AS_MADE = VARIATIONS.index((1.0, 0.0))
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.inference.closures import ClosingLips, close_at
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.lips import lip_gap
+from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at
 from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import blend

@@ -5,11 +5,11 @@ import pytest
 import torch
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.inference.closures import keep_shut
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack
-from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.mapping import MapSettings, Samples, fit_map
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import aligned, emotion_pairs, retakes, take_of

@@ -5,8 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from facesynth.inference.lips import lip_gap
-from facesynth.methods.anime_graph.closure import bilabial_spans
+from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of

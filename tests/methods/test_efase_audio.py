@@ -16,14 +16,15 @@ from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.filters import sharpen
 from facesynth.methods.efase.audio import pose_costs, pose_distances, sound_distances
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
 from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.sharpening import matching_share, sharpen
 from facesynth.methods.learn import descent
 from facesynth.methods.learn import expectation as prediction
 from facesynth.methods.learn.descent import Logs, descend
+from facesynth.methods.learn.sharpening import matching_share
 from facesynth.methods.registry import load
 
 

@@ -10,7 +10,7 @@ from corpora import tiny_corpus
 from test_efase_search import literal, random_nodes, random_query
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.warp import time_warp
+from facesynth.inference.warp import stretched, time_warp
 from facesynth.methods.efase.concatenation import Smoothing, concatenate
 from facesynth.methods.efase.costs import (
     Query,
@@ -23,8 +23,9 @@ from facesynth.methods.efase.costs import (
 )
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.search import build_index, search
-from facesynth.methods.efase.soft import Mixture, candidates, posterior, soft_search
-from facesynth.methods.efase.steps import CostWeights, step_terms, stretched
+from facesynth.methods.efase.soft import Mixture, candidates, soft_search
+from facesynth.methods.efase.steps import CostWeights, step_terms
+from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.registry import load
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.face.rig.markers import LipGap
-from facesynth.inference.phones import BILABIALS
+from facesynth.inference.lips import bilabial_spans
 from facesynth.inference.speech import PhoneTrack
 
 MOST_MM = 3.0
@@ -60,7 +60,7 @@ def with_lips_met(weights: ArrayLike, lips: LipGap, phones: PhoneTrack, fps: flo
     opening_mm = lips.opening_mm(weights)
     frames = np.arange(len(opening_mm))
     narrower_mm = np.zeros(len(opening_mm))
-    spans = _bilabials(phones, fps, len(opening_mm))
+    spans = [(a, max(min(b, len(frames)), a + 1)) for a, b in bilabial_spans(phones, fps) if a < len(frames)]
     opening_mm = from_shut(opening_mm, [float(opening_mm[first:last].min()) for first, last in spans])
     for first, last in spans:
         moment = first + int(opening_mm[first:last].argmin())
@@ -78,13 +78,3 @@ def from_shut(opening_mm: NDArray[np.float64], least_mm: Sequence[float]) -> NDA
     over_mm = np.maximum(opening_mm - shut_mm, 0)
     from_zero = over_mm + shut_mm * -np.expm1(-over_mm / FADING_MM)
     return np.where(opening_mm > 0, np.minimum(from_zero, opening_mm), opening_mm)
-
-
-def _bilabials(phones: PhoneTrack, fps: float, count: int) -> list[tuple[int, int]]:
-    """First frame and the one after the last of each p, b and m; at least one frame each."""
-    ends = np.rint(phones.ends_s * fps).astype(int)
-    starts = np.r_[0, ends[:-1]]
-    spans = [
-        (start, max(end, start + 1)) for label, start, end in zip(phones.labels, starts, ends, strict=True) if label in BILABIALS
-    ]
-    return [(start, min(end, count)) for start, end in spans if start < count]

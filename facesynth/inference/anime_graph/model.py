@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..anime_graph.assembly import Blender, likely_motions, make_piece
-from ..anime_graph.closure import close_at, keep_shut
 from ..anime_graph.graph import Candidates, LookAhead, Nodes, Step, Weights, Wish, best_path, soft_path
 from ..anime_graph.hearing import Ear, Floats, Ints
 from ..anime_graph.stream import AnimeStream
 from ..checks import checked_audio, checked_rate
+from ..closures import close_at, keep_shut
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import butterworth, forth_and_back, gaussian, sharpen
 from ..folder import Folder
 from ..graphs import Graph
 from ..layout import Layout
+from ..lips import bilabial_spans
 from ..motion import Motion
 from ..sound import resample
 from ..speech import frame_bounds
@@ -27,7 +28,6 @@ from ..speech import frame_bounds
 if TYPE_CHECKING:
     from ..expectation import Expectation
 
-BILABIALS = frozenset(["p", "b", "m"])
 NEUTRAL = "neutral"
 EMOTION_CHANGES_S, SMALLEST_SWING = 0.08, 1e-4
 LEAST_SHARE = 1e-3
@@ -113,13 +113,9 @@ class AnimeGraph:
         """
         reject_options("anime_graph", options, OPTIONS)
         plan = self.plan(speech, look_ahead=look_ahead)
-        bounds = frame_bounds(speech.phones.ends_s, self.fps)
         joined = self._mean(plan) if self.settings["temperature"] > 0 else self._blended(plan)
         frames = self.decode(sharpen(self.low_pass(joined), self.settings["sharpening"], self.fps))
-        spans = [
-            (int(a), int(b)) for p, a, b in zip(speech.phones.labels, bounds[:-1], bounds[1:], strict=True) if p in BILABIALS
-        ]
-        frames = close_at(frames, self.layout, spans, self.closed_gap, self.fps)
+        frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         motion = self._with_intensity(Motion(frames.astype(np.float32), self.fps, self.layout), speech)
         return motion if to_emotion is None else self.map_along(motion, speech, to_emotion, intensity=to_intensity)
 

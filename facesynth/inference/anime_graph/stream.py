@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..anime_graph.assembly import make_piece
-from ..anime_graph.closure import close_at, closing_frames
 from ..anime_graph.graph import Candidates, LookAhead, Step, Wish
+from ..closures import ClosingLips
 from ..errors import FacesynthError
+from ..phones import BILABIALS
 
 if TYPE_CHECKING:
     from ..anime_graph.model import AnimeGraph
@@ -33,7 +34,7 @@ class AnimeStream:
         self._path: list[int] = []
         self._blended = np.zeros((0, model.nodes.metric.shape[0]))
         self._pieces_done = self._smooth_done = 0
-        self._lips = _Lips(model)
+        self._lips = ClosingLips(model.layout, model.closed_gap, model.fps)
 
     def hear(self, audio: ArrayLike) -> NDArray[np.float32]:
         """More sound [S] at the model's rate."""
@@ -46,8 +47,8 @@ class AnimeStream:
             raise FacesynthError(f"the phone ends at {end_s} s; wanted an end after {self._end_s} s, where the one before ends")
         self._asked.append((*self.model.numbers(phone, emotion), self._end_s, float(end_s)))
         start, stop = round(self._end_s * self.model.fps), round(float(end_s) * self.model.fps)
-        if phone in ("p", "b", "m"):
-            self._lips.spans.append((start, stop))
+        if phone in BILABIALS:
+            self._lips.expect(start, stop)
         self._end_s = float(end_s)
         return self._advance()
 
@@ -92,31 +93,8 @@ class AnimeStream:
         self._pieces_done = max(self._pieces_done, ready)
         self._blended = np.concatenate([self._blended, *fresh])
         stop = max(self._smooth_done, len(self._blended) - (0 if last else model.settles_frames))
-        if stop == self._smooth_done and not last:
-            return self._lips.push(np.zeros((0, self._lips.width)), last=False)
         start = max(0, self._smooth_done - model.settles_frames)
         smooth = model.low_pass(self._blended[start:])[self._smooth_done - start : stop - start]
         self._smooth_done = stop
-        return self._lips.push(model.decode(smooth), last=last)
-
-
-class _Lips:
-    """`close_at` for frames that arrive in pieces."""
-
-    def __init__(self, model: AnimeGraph) -> None:
-        self.layout, self.gap, self.fps = model.layout, model.closed_gap, model.fps
-        self.width = model.layout.dimension * len(model.layout.names)
-        self.spans: list[tuple[int, int]] = []
-        self._held = np.zeros((0, self.width))
-        self._given = 0
-
-    def push(self, frames: NDArray[np.float64], *, last: bool) -> NDArray[np.float32]:
-        self._held = np.concatenate([self._held, frames])
-        known = self._given + len(self._held)
-        while self.spans and (last or self.spans[0][1] + closing_frames(*self.spans[0], self.fps) <= known):
-            start, stop = (max(0, at - self._given) for at in self.spans.pop(0))
-            self._held = close_at(self._held, self.layout, [(start, stop)], self.gap, self.fps)
-        untouched = [start - int(closing_frames(start, stop, self.fps)) - 1 for start, stop in self.spans]
-        count = max(0, min([known, *untouched]) - self._given)
-        final, self._held, self._given = self._held[:count], self._held[count:], self._given + count
-        return final.astype(np.float32)
+        final = [self._lips.push(model.decode(smooth)), *([self._lips.finish()] if last else [])]
+        return np.concatenate(final).astype(np.float32)

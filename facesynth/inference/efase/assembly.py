@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..efase.nodes import Floats, Ints, Nodes
-from ..efase.soft import Mixture, stretched
+from ..efase.soft import Mixture
 from ..joints import smooth_joint
-from ..layout import Layout
 from ..phones import SILENCE
-from ..warp import time_warp
+from ..warp import stretched, time_warp
 
 FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
 LOOSE = frozenset(["k", "g", "ch", "ng", "r"])
-SETTLE_S, WAKE_S, CLOSE_S = 0.25, 0.2, 0.03
+SETTLE_S, WAKE_S = 0.25, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,26 +115,3 @@ def _follow(frames: Floats, start: int, stop: int, expected: Floats, fps: float)
 def _ease(u: NDArray[np.float64]) -> Floats:
     u = np.clip(u, 0, 1)
     return u * u * (3 - 2 * u)
-
-
-def gap(frames: Floats, layout: Layout) -> Floats:
-    """[T] mean height of the upper over the lower inner lip."""
-    upper, lower = np.array(layout.lip_pairs).T
-    points = layout.points(frames)
-    return (points[:, upper, 1] - points[:, lower, 1]).mean(axis=1)
-
-
-def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: Ints, fps: float) -> Floats:
-    """Bring the smallest gap of each phone down to `wanted` [P] (NaN: leave it)."""
-    out = frames.copy()
-    now, at, push = gap(out, layout), np.arange(len(frames)), np.zeros(len(frames))
-    for target, start, stop in zip(wanted, bounds[:-1], bounds[1:], strict=True):
-        if np.isfinite(target) and stop > start:
-            k = start + int(now[start:stop].argmin())
-            excess = max(now[k] - target, 0.0)
-            push = np.maximum(push, excess * np.exp(-0.5 * ((at - k) / (CLOSE_S * fps)) ** 2))
-    upper, lower = np.array(layout.lip_pairs).T
-    points = layout.points(out)
-    points[:, upper, 1] -= push[:, None] / 2
-    points[:, lower, 1] += push[:, None] / 2
-    return out

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.assembly import Plan, Smoothing, close_lips, concatenate, gap
+from ..closures import close_lips
+from ..efase.assembly import Plan, Smoothing, concatenate
 from ..efase.bounds import StepBounds
 from ..efase.nodes import Floats, Ints, Nodes, Query, Weights
 from ..efase.search import Search
@@ -20,6 +21,7 @@ from ..filters import at_rate, gaussian, sharpen
 from ..folder import Folder
 from ..graphs import Graph
 from ..layout import Layout
+from ..lips import gap, has_lips
 from ..motion import Motion
 from ..phones import SILENCE
 from ..speech import frame_bounds
@@ -68,7 +70,7 @@ class Efase:
     @property
     def has_lips(self) -> bool:
         """Whether the gap between the lips can be read off the layout's points."""
-        return bool(self.layout.lip_pairs) and self.layout.kind != "curves"
+        return has_lips(self.layout)
 
     def synthesize(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from ..efase.nodes import Floats, Ints, Nodes, Query
 from ..posterior import posterior
 from ..products import product
+from ..warp import stretched
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +92,6 @@ def step_matrix(nodes: Nodes, i: Ints, j: Ints) -> Floats:
     cost += np.where(nodes.visemes[i][:, None] == nodes.visemes[p], 0.0, w.pnt)
     cost[:, p < 0] = w.alpha * w.pnt
     return np.where(i[:, None] == p, 0.0, cost)
-
-
-def stretched(nodes: Nodes, which: Ints, count: int) -> Floats:
-    """[n, count, D] the motions of some nodes, each time-warped to `count` frames."""
-    lengths = nodes.lengths[which]
-    share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)
-    at = np.where(np.equal(lengths, count)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
-    low = np.minimum(at.astype(np.int64), np.maximum(lengths - 2, 0)[:, None])
-    high = np.minimum(low + 1, (lengths - 1)[:, None])
-    part, first = (at - low)[..., None], nodes.starts[which][:, None]
-    return nodes.frames[first + low] * (1 - part) + nodes.frames[first + high] * part
 
 
 def _squared_distances(a: Floats, b: Floats) -> Floats:

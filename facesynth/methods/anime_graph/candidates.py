@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.warp import stretched
 from facesynth.methods.anime_graph.audio_cost import audio_costs
 from facesynth.methods.anime_graph.graph import Graph
 from facesynth.methods.anime_graph.maps import EmotionMaps
 from facesynth.methods.anime_graph.search import Step
-from facesynth.methods.efase.steps import stretched
 
 AS_RECORDED = -1
 """In place of the number of a map: the node's motion stays as it is."""

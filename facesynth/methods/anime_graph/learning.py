@@ -23,9 +23,9 @@ from facesynth.methods.anime_graph.candidates import stretched_motions
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.plan import lay_steps
 from facesynth.methods.anime_graph.soft import step_terms
-from facesynth.methods.efase.sharpening import matching_share
-from facesynth.methods.efase.soft import posterior
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.learn.posterior import posterior
+from facesynth.methods.learn.sharpening import matching_share
 from facesynth.progress import track
 
 NUMBERS = ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")

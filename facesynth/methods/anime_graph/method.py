@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 from torch import nn
 
 from facesynth.corpus import Corpus
+from facesynth.inference.closures import ClosingLips, close_at, keep_shut
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.filters import sharpen
+from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import Speech
 from facesynth.methods.anime_graph.build import GraphBuilder
 from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.capabilities import CAPABILITIES
-from facesynth.methods.anime_graph.closure import ClosingLips, bilabial_spans, close_at, keep_shut, narrowest_gaps
 from facesynth.methods.anime_graph.components import BLOCKS, FaceComponents
 from facesynth.methods.anime_graph.features import AudioFeatures, ranges
 from facesynth.methods.anime_graph.graph import PHONE_INDEX, VISEMES, Graph
@@ -43,7 +45,6 @@ from facesynth.methods.anime_graph.soft import mean_motion
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
 from facesynth.methods.anime_graph.streaming import FaceStream, Stream
 from facesynth.methods.capabilities import Account
-from facesynth.methods.efase.sharpening import sharpen
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
@@ -80,7 +81,7 @@ class AnimeGraph(Method):
     pose_weight : float
         Of a node's squared distance (mean over channels, mm²) from the pose that sound and phones lead one to expect.
     sharpening : float
-        How much quick movement is raised (see `facesynth.methods.efase.sharpening`); a mean moves too little.
+        How much quick movement is raised (see `facesynth.inference.filters.sharpen`); a mean moves too little.
     learn : bool
         `fit` starts from these weights, learns those above 0, and the sharpening, on sentences that it keeps out of the
         graph meanwhile, and leaves what it found in `config`.

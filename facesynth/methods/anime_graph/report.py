@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.closures import keep_shut
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
-from facesynth.methods.anime_graph.closure import keep_shut
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.mapping import (
     WIDTHS,

@@ -17,7 +17,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.candidates import Chooser
 from facesynth.methods.anime_graph.plan import Plan, make_piece
 from facesynth.methods.anime_graph.search import Step, Weights
-from facesynth.methods.efase.soft import posterior
+from facesynth.methods.learn.posterior import posterior
 
 LEAST_SHARE = 1e-3
 """Candidates that are less probable than this are left out of the mean."""

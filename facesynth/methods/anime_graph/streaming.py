@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.closures import ClosingLips
 from facesynth.inference.phones import BILABIALS, PHONES
 from facesynth.methods.anime_graph.assembly import Blender
 from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
-from facesynth.methods.anime_graph.closure import ClosingLips
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.lowpass import low_pass
 from facesynth.methods.anime_graph.plan import Wish, make_piece

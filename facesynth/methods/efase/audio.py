@@ -22,8 +22,8 @@ from torch import Tensor, nn
 from facesynth.corpus import Corpus, node_name
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import Speech
+from facesynth.inference.warp import stretched
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
-from facesynth.methods.efase.steps import stretched
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.motion.pca import Pca

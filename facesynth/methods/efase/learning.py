@@ -19,16 +19,18 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.warp import stretched
 from facesynth.methods.efase.audio import pose_distances
 from facesynth.methods.efase.costs import Query, target_costs
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import part, stretches
-from facesynth.methods.efase.sharpening import matching_share
-from facesynth.methods.efase.soft import candidates, posterior
-from facesynth.methods.efase.steps import CostWeights, StepTerms, step_terms, stretched
+from facesynth.methods.efase.soft import candidates
+from facesynth.methods.efase.steps import CostWeights, StepTerms, step_terms
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.learn.posterior import posterior
+from facesynth.methods.learn.sharpening import matching_share
 from facesynth.motion.resample import resample
 from facesynth.progress import track
 

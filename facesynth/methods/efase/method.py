@@ -11,14 +11,16 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus
+from facesynth.inference.closures import close_lips
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.filters import sharpen
+from facesynth.inference.lips import gap, has_lips
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.audio import AudioTerms, Expected
 from facesynth.methods.efase.capabilities import CAPABILITIES
-from facesynth.methods.efase.closures import close_lips, gap, has_lips
 from facesynth.methods.efase.concatenation import Smoothing, concatenate, joints
 from facesynth.methods.efase.costs import Query, Weights, target_costs
 from facesynth.methods.efase.database import build_database
@@ -29,7 +31,6 @@ from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.plan import Plan, plan_speech
 from facesynth.methods.efase.search import Path, SearchIndex, build_index, search
-from facesynth.methods.efase.sharpening import sharpen
 from facesynth.methods.efase.soft import Mixture, soft_search
 from facesynth.methods.efase.trees import Forest
 from facesynth.methods.method import Method

@@ -8,30 +8,14 @@ gradient in them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from facesynth.inference.warp import stretched
 from facesynth.methods.efase.nodes import Floats, Ints, MotionNodes
-
-
-class Pieces(Protocol):
-    """Nodes of any database: node n moves through `frames[starts[n] : starts[n] + lengths[n]]`."""
-
-    @property
-    def frames(self) -> Floats:
-        """[F, D]"""
-
-    @property
-    def starts(self) -> Ints:
-        """[N]"""
-
-    @property
-    def lengths(self) -> Ints:
-        """[N] in frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +61,6 @@ def step_terms(nodes: MotionNodes, before: Ints, after: Ints) -> StepTerms:
     place, speed = _joint_terms(nodes, before, after)
     terms = (_bends(nodes, before, previous) * free, place * free, speed * free, switches, orphan, captured)
     return StepTerms(*(torch.from_numpy(np.ascontiguousarray(term, np.float64)) for term in terms))
-
-
-def stretched(nodes: Pieces, which: Ints, count: int) -> Floats:
-    """[n, count, D] the motions of the nodes `which`, each time-warped to `count` frames."""
-    lengths = nodes.lengths[which]
-    share = np.array([0.5]) if count == 1 else np.linspace(0, 1, count)
-    at = np.where(np.equal(lengths, count)[:, None], np.arange(count), (lengths - 1)[:, None] * share)
-    low = np.minimum(at.astype(np.int64), np.maximum(lengths - 2, 0)[:, None])
-    high = np.minimum(low + 1, (lengths - 1)[:, None])
-    part = (at - low)[..., None]
-    first = nodes.starts[which][:, None]
-    return np.asarray(nodes.frames[first + low] * (1 - part) + nodes.frames[first + high] * part)
 
 
 def _joint_terms(nodes: MotionNodes, before: Ints, after: Ints) -> tuple[Floats, Floats]:

@@ -1,4 +1,8 @@
-"""Lips that were shut stay shut when the rest of the face changes."""
+"""Lips that were shut are shut in what is made of them; stretching, smoothing and blending all open them a little.
+
+`close_lips` gives each phone the gap that its own recording had, `close_at` gives spans of frames one gap of the performer,
+and `keep_shut` holds on to closures while the rest of the face changes.
+"""
 
 from __future__ import annotations
 
@@ -7,25 +11,44 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.layout import Layout
-from facesynth.inference.phones import BILABIALS
-from facesynth.inference.speech import PhoneTrack
+from .layout import Layout
+from .lips import Span, gap, has_lips, pair_gaps
 
+FADING_S = 0.03
+"""Standard deviation of the bump that `close_lips` narrows the mouth by, seconds."""
 SHUT_SHARE = 0.25
 """Lips count as shut up to this share of the way from the narrowest gap to a wide one …"""
 OPEN_SHARE = 0.6
-"""… and as open from this share on; between them they are held together less and less."""
-
+"""… and as open from this share on; between them `keep_shut` holds them together less and less."""
 CLOSING_S = 0.04
-"""Lips take at least this long to close and to open, seconds."""
+"""In `close_at`, lips take at least this long to close and to open, seconds."""
 LONGEST_CLOSING_S = 0.15
 """… and at most this long, so that a stream knows how much to hold back."""
 
-Span = tuple[int, int]
-"""First frame of a p, b or m and one past its last."""
+Floats = NDArray[np.float64]
 
 
-def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout: Layout) -> NDArray[np.float64]:
+def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: NDArray[np.int64], fps: float) -> Floats:
+    """Frames [T, C] with the smallest gap of each phone, bounds [P + 1], brought down to `wanted` [P] (NaN: leave it).
+
+    Both lips move half of the way, fading over 30 ms.
+    """
+    out = frames.copy()
+    now, at = gap(out, layout), np.arange(len(frames))
+    push = np.zeros(len(frames))
+    for target, start, stop in zip(wanted, bounds[:-1], bounds[1:], strict=True):
+        if np.isfinite(target) and stop > start:
+            k = start + int(now[start:stop].argmin())
+            excess = max(now[k] - target, 0.0)
+            push = np.maximum(push, excess * np.exp(-0.5 * ((at - k) / (FADING_S * fps)) ** 2))
+    upper, lower = np.array(layout.lip_pairs).T
+    points = layout.points(out)
+    points[:, upper, 1] -= push[:, None] / 2
+    points[:, lower, 1] += push[:, None] / 2
+    return out
+
+
+def keep_shut(changed: Floats, before: Floats, layout: Layout) -> Floats:
     """Frames [T, C] like `changed`, with the inner lips as near to each other as they were where they were shut `before`.
 
     Each pair of facing lip points gets back the distance vector that it had, half from above and half from below;
@@ -35,45 +58,40 @@ def keep_shut(changed: NDArray[np.float64], before: NDArray[np.float64], layout:
         return changed
     upper, lower = np.array(layout.lip_pairs).T
     points, old = layout.points(changed.copy()), layout.points(before)
-    shut = _shut(old[:, upper, 1] - old[:, lower, 1])[..., None]
+    shut = _shut(pair_gaps(before, layout))[..., None]
     apart = (points[:, upper] - points[:, lower]) - (old[:, upper] - old[:, lower])
     _bring_together(points, layout, shut * apart / 2)
     return points.reshape(changed.shape)
 
 
-def close_at(frames: NDArray[np.float64], layout: Layout, spans: Iterable[Span], gap: float, fps: float) -> NDArray[np.float64]:
-    """Frames [T, C] whose lips come as near to each other as `gap` within each span of frames.
+def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: float, fps: float) -> Floats:
+    """Frames [T, C] whose lips come as near to each other as the gap `nearest` within each span of frames.
 
-    Blending and smoothing open the lips a little where a p, b or m shuts them. What is missing is added around the
-    narrowest frame, and fades within half the span, but neither faster than 40 ms nor slower than 150 ms.
+    What is missing is added around the narrowest frame, and fades within half the span, but neither faster than 40 ms
+    nor slower than 150 ms. Layouts without lip pairs stay as they are.
     """
     if not has_lips(layout):
         return frames
-    upper, lower = np.array(layout.lip_pairs).T
-    points = layout.points(frames.copy())
+    out = frames.copy()
+    points, pairs = layout.points(out), len(layout.lip_pairs)
     for start, stop in spans:
-        heights = (points[start:stop, upper, 1] - points[start:stop, lower, 1]).mean(axis=1)
-        if not len(heights) or heights.min() <= gap:
+        heights = gap(out[start:stop], layout)
+        if not len(heights) or heights.min() <= nearest:
             continue
         middle, reach = start + int(heights.argmin()), closing_frames(start, stop, fps)
         near = np.arange(max(0, int(middle - reach)), min(len(points), int(middle + reach) + 1))
         amount = 0.5 + 0.5 * np.cos(np.pi * np.clip((near - middle) / reach, -1, 1))
-        correction = np.zeros((len(near), len(upper), layout.dimension))
-        correction[..., 1] = (amount * (heights.min() - gap))[:, None] / 2
+        correction = np.zeros((len(near), pairs, layout.dimension))
+        correction[..., 1] = (amount * (heights.min() - nearest))[:, None] / 2
         some = points[near]
         _bring_together(some, layout, correction)
         points[near] = some
-    return points.reshape(frames.shape)
+    return out
 
 
 def closing_frames(start: int, stop: int, fps: float) -> float:
-    """How many frames before and after its narrowest one a closure in a span touches."""
+    """How many frames before and after its narrowest one `close_at` touches in a span."""
     return float(np.clip((stop - start) / 2, CLOSING_S * fps, LONGEST_CLOSING_S * fps)) + 1
-
-
-def has_lips(layout: Layout) -> bool:
-    """Whether a layout says which points of the lips face each other."""
-    return layout.dimension > 1 and bool(layout.lip_pairs)
 
 
 class ClosingLips:
@@ -83,17 +101,17 @@ class ClosingLips:
     can touch it any more.
     """
 
-    def __init__(self, layout: Layout, gap: float, fps: float) -> None:
-        self.layout, self.gap, self.fps = layout, gap, fps
+    def __init__(self, layout: Layout, nearest: float, fps: float) -> None:
+        self.layout, self.nearest, self.fps = layout, nearest, fps
         self._spans: list[Span] = []
         self._held = np.zeros((0, layout.channels))
         self._given = 0
 
     def expect(self, start: int, stop: int) -> None:
-        """A p, b or m lies at these frames."""
+        """Lips close at these frames."""
         self._spans.append((start, stop))
 
-    def push(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    def push(self, frames: Floats) -> Floats:
         """The next frames [n, C]; returns those [n', C] that are final, possibly none."""
         self._held = np.concatenate([self._held, frames])
         known = self._given + len(self._held)
@@ -102,7 +120,7 @@ class ClosingLips:
         untouched = [start - int(closing_frames(start, stop, self.fps)) - 1 for start, stop in self._spans]
         return self._give(min([known, *untouched]))
 
-    def finish(self) -> NDArray[np.float64]:
+    def finish(self) -> Floats:
         """The frames [n, C] that were held back."""
         while self._spans:
             self._close(self._spans.pop(0))
@@ -110,32 +128,16 @@ class ClosingLips:
 
     def _close(self, span: Span) -> None:
         here = (max(0, span[0] - self._given), max(0, span[1] - self._given))
-        self._held = close_at(self._held, self.layout, [here], self.gap, self.fps)
+        self._held = close_at(self._held, self.layout, [here], self.nearest, self.fps)
 
-    def _give(self, stop: int) -> NDArray[np.float64]:
+    def _give(self, stop: int) -> Floats:
         count = max(0, stop - self._given)
         final, self._held = self._held[:count], self._held[count:]
         self._given += count
         return final
 
 
-def narrowest_gaps(frames: NDArray[np.float32], layout: Layout, spans: Iterable[Span]) -> list[float]:
-    """The smallest opening of the inner lips in each span of frames [T, C] that has no missing samples."""
-    if not has_lips(layout):
-        return []
-    upper, lower = np.array(layout.lip_pairs).T
-    points = layout.points(frames)
-    openings = [(points[a:b, upper, 1] - points[a:b, lower, 1]).mean(axis=1) for a, b in spans if b > a]
-    return [float(opening.min()) for opening in openings if np.isfinite(opening).all()]
-
-
-def bilabial_spans(phones: PhoneTrack, fps: float) -> list[Span]:
-    """First frame and one past the last of each p, b, m."""
-    bounds = phones.frame_bounds(fps).tolist()
-    return [(a, b) for label, a, b in zip(phones.labels, bounds[:-1], bounds[1:], strict=True) if label in BILABIALS]
-
-
-def _bring_together(points: NDArray[np.float64], layout: Layout, correction: NDArray[np.float64]) -> None:
+def _bring_together(points: Floats, layout: Layout, correction: Floats) -> None:
     """Move upper lip points [T, K, dimension] by minus and lower ones by plus the correction [T, pairs, dimension]."""
     upper, lower = np.array(layout.lip_pairs).T
     for group, own, sign in (("upper_lip", upper, -1), ("lower_lip", lower, 1)):
@@ -144,7 +146,7 @@ def _bring_together(points: NDArray[np.float64], layout: Layout, correction: NDA
         points[:, own] += sign * correction
 
 
-def _shut(gaps: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shut(gaps: Floats) -> Floats:
     """[T, pairs] 1 where the lips are shut, 0 where they are open."""
     narrow, wide = np.nanpercentile(gaps, [1, 95], axis=0)
     share = (gaps - narrow) / np.maximum(wide - narrow, 1e-6)
