@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,8 @@ from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.capture.models import MODELS
 from facesynth.capture.track import Track, track_face
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_arrays
 
 VERSION = 1
 """Raised where tracking changes its results, so that old tracks are not used any more."""
@@ -42,8 +42,7 @@ def _place(path: Path, face: int | None) -> Path:
 def _read(kept: Path) -> Track | None:
     """The track, or None where there is none or it is damaged."""
     try:
-        with open(kept, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            damaged = int(stored["damaged"]) if "damaged" in stored else 0
-            return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]), damaged)
-    except (OSError, ValueError, EOFError, KeyError, RuntimeError, zlib.error, zipfile.BadZipFile):
+        stored = read_arrays(kept, "a track", ("points_px", "irises_px", "fps"), ("damaged",))
+    except FacesynthError:
         return None
+    return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]), int(stored.get("damaged", 0)))

@@ -118,6 +118,7 @@ def _speech(seed: int) -> Speech:
 
     from facesynth import __version__
     from facesynth.cache import cache_dir
+    from facesynth.inference.npz import read_arrays
     from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
     from facesynth.performer.lines import DEMO_LINES
 
@@ -125,10 +126,10 @@ def _speech(seed: int) -> Speech:
     path = cache_dir("models") / f"demo-speech-{sha256(made_of.encode()).hexdigest()[:16]}.npz"
     if not path.exists():
         _keep_speech(path, seed)
-    with np.load(path, allow_pickle=False) as kept:
-        phones = PhoneTrack(tuple(kept["phones"].tolist()), kept["phone_ends_s"])
-        emotions = EmotionTrack(tuple(kept["emotions"].tolist()), kept["emotion_ends_s"], np.ones(len(kept["emotions"])))
-        return Speech(kept["audio"], int(kept["rate"]), phones, emotions, " ".join(text for text, _ in DEMO_LINES))
+    kept = read_arrays(path, "the demo's speech", ("audio", "rate", "phones", "phone_ends_s", "emotions", "emotion_ends_s"))
+    phones = PhoneTrack(tuple(kept["phones"].tolist()), kept["phone_ends_s"])
+    emotions = EmotionTrack(tuple(kept["emotions"].tolist()), kept["emotion_ends_s"], np.ones(len(kept["emotions"])))
+    return Speech(kept["audio"], int(kept["rate"]), phones, emotions, " ".join(text for text, _ in DEMO_LINES))
 
 
 def _keep_speech(path: Path, seed: int) -> None:

@@ -57,11 +57,14 @@ def read_header(path: Path) -> Header:
     if not isinstance(plain, dict) or plain.get("format") != FORMAT:
         got = plain.get("format") if isinstance(plain, dict) else None
         raise FacesynthError(f"{path} states corpus format {got}; this facesynth reads format {FORMAT}")
+    if lacking := [name for name in ("performer", "layout", "fps", "emotions") if name not in plain]:
+        raise FacesynthError(f"{path}: {lacking[0]!r} is missing")
+    if not isinstance(plain["emotions"], list):
+        raise FacesynthError(f"{path}: emotions must be a list; got {plain['emotions']!r}")
     try:
         return _header(plain)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else error
-        raise FacesynthError(f"{path}: {what}") from None
+    except (ValueError, TypeError) as error:  # a FacesynthError, or fps that is no number
+        raise FacesynthError(f"{path}: {error}") from None
 
 
 def no_corpus(folder: Path) -> FacesynthError:

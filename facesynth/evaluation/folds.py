@@ -89,16 +89,22 @@ def read_folds(path: str | Path, corpus: Corpus) -> tuple[Fold, ...]:
 
     Refused, with the reason: ids that the corpus lacks, a sentence learned from and tested on, an utterance tested twice.
     """
+    wanted = 'wanted JSON with "folds": [{"train": [ids], "test": [ids]}, …]'
     try:
         plain = json.loads(Path(path).read_text(encoding="utf-8"))
-        if plain.get("format", FORMAT) != FORMAT:
-            raise FacesynthError(f"{path} has format {plain['format']}; this facesynth reads {FORMAT}")
-        folds = tuple(_fold(corpus, fold) for fold in plain["folds"])
-    except FacesynthError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        what = 'wanted JSON with "folds": [{"train": [ids], "test": [ids]}, …]'
-        raise FacesynthError(f"{path} holds no folds ({type(error).__name__}: {error}); {what}") from None
+    except (OSError, ValueError) as error:
+        raise FacesynthError(f"{path} holds no folds ({error}); {wanted}") from None
+    if not isinstance(plain, dict) or not isinstance(plain.get("folds"), list):
+        raise FacesynthError(f"{path} holds no folds; {wanted}")
+    if plain.get("format", FORMAT) != FORMAT:
+        raise FacesynthError(f"{path} has format {plain['format']}; this facesynth reads {FORMAT}")
+    for fold in plain["folds"]:
+        if not isinstance(fold, dict) or "test" not in fold:
+            raise FacesynthError(f"{path} holds no folds: got {fold!r}; {wanted}")
+        for name in fold.keys() & {"train", "test"}:
+            if not isinstance(fold[name], list):
+                raise FacesynthError(f"{path} holds no folds: {name} must be a list of ids; {wanted}")
+    folds = tuple(_fold(corpus, fold) for fold in plain["folds"])
     check_folds(corpus, folds)
     return folds
 
@@ -128,11 +134,5 @@ def rest_of(corpus: Corpus, tested: Iterable[str]) -> Fold:
 
 
 def _fold(corpus: Corpus, plain: dict[str, Any]) -> Fold:
-    test = _ids(plain, "test")
-    return Fold(_ids(plain, "train"), test) if "train" in plain else rest_of(corpus, test)
-
-
-def _ids(plain: dict[str, Any], name: str) -> tuple[str, ...]:
-    if not isinstance(plain[name], list):
-        raise TypeError(f"{name} must be a list of ids, got {plain[name]!r}")
-    return tuple(map(str, plain[name]))
+    test = tuple(map(str, plain["test"]))
+    return Fold(tuple(map(str, plain["train"])), test) if "train" in plain else rest_of(corpus, test)

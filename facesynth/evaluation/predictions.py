@@ -19,7 +19,6 @@ of itself). Other motions of a method that draws them lie in `METHOD/samples/NUM
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -32,6 +31,7 @@ from facesynth.evaluation.cost import Spent
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.inference.npz import read_arrays
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Joining, Reporting
 from facesynth.methods.method import Method
@@ -72,15 +72,14 @@ def save_prediction(path: str | Path, utterance_id: str, motion: Motion) -> None
 
 def load_prediction(path: str | Path, layout: Layout | None = None) -> tuple[str, Motion]:
     """Utterance id and motion of a file in this form; `layout` for files that state none. FacesynthError for others."""
+    required = ("frames", "fps") if layout else ("frames", "fps", "layout")
+    arrays = read_arrays(path, "a prediction in the documented form", required, ("layout", "utterance", "head", "eyes"))
     try:
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
-        if "layout" in arrays or layout is None:
-            layout = Layout.from_dict(json.loads(str(arrays["layout"])))
-        motion = Motion(arrays["frames"], float(arrays["fps"]), layout, arrays.get("head"), arrays.get("eyes"))
-        return str(arrays.get("utterance", Path(path).stem)), motion
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        raise FacesynthError(f"{path} is no prediction that facesynth can read ({error}); see the form it wants") from None
+        stated = Layout.from_dict(json.loads(str(arrays["layout"]))) if "layout" in arrays or layout is None else layout
+        motion = Motion(arrays["frames"], float(arrays["fps"]), stated, arrays.get("head"), arrays.get("eyes"))
+    except (ValueError, TypeError) as error:  # what is no JSON, no one rate, no motion
+        raise FacesynthError(f"{path} is not a prediction in the documented form ({error})") from None
+    return str(arrays.get("utterance", Path(path).stem)), motion
 
 
 def sample_path(path: Path, number: int) -> Path:

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
-import struct
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FacesynthError
+from .npz import view_arrays
 
 FORMAT = 2
 """Of the manifest: one is written, no other is read."""
 MANIFEST = "manifest.json"
-MOST_BYTES = 1 << 24
-"""Of a manifest: a larger one is none."""
+LARGEST_MANIFEST_BYTES = 1 << 24
 ARRAYS = "arrays.npz"
-MOST_HEADER = 1 << 16
-"""Of an array in a file, bytes."""
 OPSET = 20
 """Of the graphs."""
 KEYS = (
@@ -59,9 +53,9 @@ class Folder:
         """All arrays, with the types and shapes that the manifest states; they cannot be written to."""
         path, content = self.path / ARRAYS, self.bytes_of(ARRAYS)
         try:
-            found = _members(content, list(self.manifest["arrays"]))
-        except (zipfile.BadZipFile, ValueError, KeyError) as error:
-            raise FacesynthError(f"{path}: cannot be read ({error}); export the model again") from None
+            found = view_arrays(content, self.manifest["arrays"])
+        except FacesynthError as error:
+            raise FacesynthError(f"{path}: {error}; export the model again") from None
         for name, wanted in self.manifest["arrays"].items():
             got = found[name]
             if list(got.shape) != wanted["shape"] or str(got.dtype) != wanted["dtype"]:
@@ -98,28 +92,6 @@ def open_folder(path: str | Path) -> Folder:
     return Folder(folder, manifest, contents)
 
 
-def _members(content: bytes, names: list[str]) -> dict[str, NDArray[Any]]:
-    """Arrays of an uncompressed npz as views of its bytes, whose hash is known: nothing is copied or summed up again."""
-    found = {}
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        for name in names:
-            entry = archive.getinfo(f"{name}.npy")
-            if entry.compress_type != zipfile.ZIP_STORED:
-                raise ValueError(f"{name} is compressed")
-            name_bytes, extra_bytes = struct.unpack_from("<HH", content, entry.header_offset + 26)
-            start = entry.header_offset + 30 + name_bytes + extra_bytes
-            member = io.BytesIO(content[start : start + min(entry.file_size, MOST_HEADER)])
-            version = np.lib.format.read_magic(member)
-            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-            shape, in_columns, dtype = read(member)
-            if dtype.hasobject:
-                raise ValueError(f"{name} holds objects")
-            count = int(np.prod(shape, dtype=np.int64))
-            flat = np.frombuffer(content, dtype, count, start + member.tell())
-            found[name] = flat.reshape(shape, order="F" if in_columns else "C")
-    return found
-
-
 def checked_bytes(path: Path, wanted: Any) -> bytes:
     """The content of a file whose size and sha256 are as wanted."""
     try:
@@ -135,7 +107,7 @@ def checked_bytes(path: Path, wanted: Any) -> bytes:
 
 def _manifest(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > LARGEST_MANIFEST_BYTES:
             raise FacesynthError(f"{path} is too large for a manifest")
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

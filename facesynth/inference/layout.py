@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import numbers
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
@@ -89,25 +90,50 @@ class Layout:
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:
         """The inverse of `to_dict`; points of groups and lip pairs may be given by number or by name."""
+        if not isinstance(plain, Mapping):
+            raise FacesynthError(f"a layout is a mapping of kind, names, …; got {type(plain).__name__}")
+        if lacking := [field for field in ("kind", "names") if field not in plain]:
+            raise FacesynthError(f"{lacking[0]!r} is missing in the layout")
         extra = set(plain) - {"kind", "names", "groups", "lip_pairs", "neutral"}
         if extra:
             raise unknown("layout field", sorted(extra)[0], ("kind", "names", "groups", "lip_pairs", "neutral"))
-        names = tuple(map(str, plain["names"]))
-        pairs = tuple((_number(a, names), _number(b, names)) for a, b in plain.get("lip_pairs") or ())
-        neutral = plain.get("neutral")
+        names = tuple(map(str, _listed("names", plain["names"])))
+        groups = plain.get("groups") or {}
+        if not isinstance(groups, Mapping):
+            raise FacesynthError(f"the layout's groups are a mapping from a name to points; got {type(groups).__name__}")
+        pairs = [_listed("a pair of lip points", pair) for pair in _listed("lip_pairs", plain.get("lip_pairs") or ())]
+        if odd := next((pair for pair in pairs if len(pair) != 2), None):
+            raise FacesynthError(f"a pair of lip points is an upper and a lower one; got {odd}")
         return cls(
-            plain["kind"],
+            str(plain["kind"]),  # type: ignore[arg-type]  # checked in __post_init__
             names,
-            {str(k): tuple(_number(point, names) for point in v) for k, v in (plain.get("groups") or {}).items()},
-            pairs,
-            None if neutral is None else tuple(map(float, neutral)),
+            {str(name): tuple(_number(point, names) for point in _listed(name, group)) for name, group in groups.items()},
+            tuple((_number(upper, names), _number(lower, names)) for upper, lower in pairs),
+            _neutral(plain.get("neutral")),
         )
+
+
+def _listed(what: Any, value: Any) -> list[Any]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise FacesynthError(f"{what} of a layout must be a list; got {type(value).__name__}")
+    return list(value)
+
+
+def _neutral(value: Any) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    try:
+        return tuple(float(number) for number in _listed("neutral", value))
+    except (TypeError, ValueError) as error:
+        raise FacesynthError(f"the neutral pose of a layout holds numbers; {error}") from None
 
 
 def _number(point: Any, names: tuple[str, ...]) -> int:
     """The number of a point that is given by number or by name."""
-    if not isinstance(point, str):
+    if isinstance(point, numbers.Integral) and not isinstance(point, bool):
         return int(point)
+    if not isinstance(point, str):
+        raise FacesynthError(f"a layout's points are given by number or by name; got {point!r}")
     if point not in names:
         raise unknown("point of a group", point, names)
     return names.index(point)

@@ -22,7 +22,7 @@ def read_truth(corpus_path: str | Path) -> dict[str, tuple[Fault, ...]]:
     try:
         plain: dict[str, list[dict[str, Any]]] = json.loads(path.read_text(encoding="utf-8"))
         return {utterance: tuple(_fault(fault) for fault in faults) for utterance, faults in plain.items()}
-    except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
+    except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:  # of the file's form
         raise FacesynthError(f"{path} is damaged ({error}); delete the folder and build the performer again") from None
 
 

@@ -54,7 +54,7 @@ def test_other_files_are_refused_in_one_line(tmp_path, fault):
         np.savez(path, **{**arrays, "frames": arrays["frames"][:, :5]})
     else:
         np.savez(path, **{**arrays, "layout": "[1, 2]"})
-    with pytest.raises(FacesynthError, match=r"p\.npz is no prediction") as caught:
+    with pytest.raises(FacesynthError, match=r"p\.npz is not a prediction") as caught:
         load_prediction(path)
     assert "\n" not in str(caught.value)
 

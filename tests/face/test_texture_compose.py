@@ -166,7 +166,7 @@ def test_shapes_and_backgrounds_must_be_as_many(speaker):
 
 
 def test_a_file_that_would_unpack_to_gigabytes_is_refused_unread(tmp_path, monkeypatch):
-    monkeypatch.setattr("facesynth.archive.LARGEST_BYTES", 1000)
+    monkeypatch.setattr("facesynth.inference.npz.LARGEST_BYTES", 1000)
     np.savez_compressed(tmp_path / "big.npz", pictures=np.zeros(5000, np.uint8))
     with pytest.raises(FacesynthError, match=r"big\.npz would unpack"):
         Speaker.load(tmp_path / "big.npz")

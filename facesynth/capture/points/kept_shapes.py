@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.capture.points.footage import Footage, read_footage
@@ -15,6 +14,7 @@ from facesynth.capture.points.reference import Following, Reference
 from facesynth.capture.points.shapes import Shapes
 from facesynth.capture.points.tracking import Drift
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_arrays
 from facesynth.motion.planar import HeadMaps
 
 VERSION = 1
@@ -77,12 +77,14 @@ def _place(video: Path, reference: Reference) -> Path:
 def _read(kept: Path) -> tuple[Shapes, Following, bool] | None:
     """None where there is nothing, or something damaged."""
     try:
-        stored = read_arrays(kept, ("points", "fps", "linear", "shift", "figures"), "shapes")
-        points, fps = stored["points"].astype(np.float64), float(stored["fps"])
-        head = HeadMaps(stored["linear"].astype(np.float64), stored["shift"].astype(np.float64))
-        lost, median, worst, drifted, resampled = stored["figures"].tolist()
-    except (ValueError, TypeError):  # FacesynthError is one of them
+        stored = read_arrays(kept, "a file of followed shapes", ("points", "fps", "linear", "shift", "figures"))
+    except FacesynthError:
         return None
-    if points.ndim != 3 or head.linear.shape != (len(points), 2, 2) or head.shift.shape != (len(points), 2):
+    count = len(np.atleast_1d(stored["points"]))
+    wanted = {"linear": (count, 2, 2), "shift": (count, 2), "figures": (5,), "fps": ()}
+    if stored["points"].ndim != 3 or any(stored[name].shape != shape for name, shape in wanted.items()):
         return None
-    return Shapes(points, head, fps), Following(lost, Drift(median, worst, drifted)), bool(resampled)
+    lost, median, worst, drifted, resampled = stored["figures"].tolist()
+    head = HeadMaps(stored["linear"].astype(np.float64), stored["shift"].astype(np.float64))
+    shapes = Shapes(stored["points"].astype(np.float64), head, float(stored["fps"]))
+    return shapes, Following(lost, Drift(median, worst, drifted)), bool(resampled)

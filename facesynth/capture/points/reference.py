@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.capture.points.footage import Footage
 from facesynth.capture.points.region import FaceRegion
 from facesynth.capture.points.shapes import Shapes, mean_shape, shapes_of
 from facesynth.capture.points.tracking import Drift, Grey, Points, corners, drift, follow_clip
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_arrays
 from facesynth.progress import track
 
 COUNT = 200
@@ -95,7 +95,7 @@ class Reference:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read what `save` wrote; FacesynthError for anything else."""
-        arrays = read_arrays(path, [field.name for field in fields(cls)], "points of a speaker")
+        arrays = read_arrays(path, "a file of the points of a speaker", [field.name for field in fields(cls)])
         picture, points, mean = arrays["picture"], arrays["points"], arrays["mean"]
         lower = int(arrays["lower"])
         whole = picture.ndim == 2 and picture.dtype == np.uint8 and points.shape == mean.shape == (len(points), 2)

@@ -44,7 +44,7 @@ def read_articulography(path: Path) -> Reading:
         raise FacesynthError(f"{path} holds no structs with NAME, SRATE and SIGNAL, as MVIEW writes them")
     try:
         return _read(path, structs)
-    except (IndexError, TypeError, AttributeError, KeyError) as error:
+    except (IndexError, TypeError, AttributeError, KeyError) as error:  # structs within structs, of any form
         raise FacesynthError(f"{path}: its structs are not as MVIEW writes them ({error})") from None
 
 

@@ -78,7 +78,7 @@ def _opened(path: Path) -> _Content:
         with warnings.catch_warnings(record=True) as said, open(path, "rb") as file:
             warnings.simplefilter("always")
             content = _content(Reader(file))
-    except Exception as error:  # the library raises anything on damaged files
+    except Exception as error:  # the library raises anything, bare Exception too, on damaged files
         raise FacesynthError(f"{path} is no C3D file, or is damaged ({' '.join(str(error).split())})") from None
     if any("end of file" in str(warning.message) for warning in said):
         raise FacesynthError(f"{path} is cut off: it states more frames than it holds; copy it again")

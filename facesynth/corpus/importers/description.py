@@ -106,15 +106,18 @@ def read_description(path: Path) -> Description:
 
     try:
         plain = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
-        plain = dict(plain.get("layout", plain))
-        written = _written(path, plain.pop(FILES, None) or {})
-        return Description(Layout.from_dict(plain) if plain else None, written)
     except FileNotFoundError:
         raise FacesynthError(f"{path}: no such layout file") from None
-    except KeyError as error:
-        raise FacesynthError(f"{path}: {error} is missing; a layout needs kind and names") from None
-    except (yaml.YAMLError, OSError, TypeError, AttributeError, ValueError) as error:
+    except (yaml.YAMLError, OSError, UnicodeDecodeError) as error:
         raise FacesynthError(f"{path} is not a layout: {' '.join(str(error).split())}") from None
+    inner = plain.get("layout", plain) if isinstance(plain, dict) else plain
+    if not isinstance(inner, dict) or not isinstance(inner.get(FILES) or {}, dict):
+        raise FacesynthError(f"{path} is not a layout: wanted a mapping of kind, names … and {FILES}")
+    try:
+        written = _written(path, inner.pop(FILES, None) or {})
+        return Description(Layout.from_dict(inner) if inner else None, written)
+    except FacesynthError as error:
+        raise FacesynthError(f"{path} is not a layout: {' '.join(str(error).split())}; it needs kind and names") from None
 
 
 def description_beside(path: Path) -> Description | None:

@@ -10,7 +10,7 @@ from facesynth.corpus.importers.description import Written, description_beside
 from facesynth.corpus.importers.flame import is_flame, read_flame
 from facesynth.corpus.importers.livelink import is_live_link, read_livelink_motion
 from facesynth.corpus.importers.reading import Reading, require_file
-from facesynth.corpus.importers.tables import load_mat, read_arrays, read_table
+from facesynth.corpus.importers.tables import load_mat, read_numbers, read_table
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 
@@ -37,7 +37,7 @@ def read(
         raise FacesynthError(f"{path} is none of {', '.join(sorted(SUFFIXES))}")
     if suffix == ".csv" and is_live_link(path):
         return read_livelink_motion(path)
-    if suffix == ".npz" and is_flame(arrays := read_arrays(path)):
+    if suffix == ".npz" and is_flame(arrays := read_numbers(path)):
         return read_flame(path, arrays)
     if suffix == ".mat" and is_articulography(load_mat(path)):
         return read_articulography(path)

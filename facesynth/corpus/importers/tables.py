@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Mapping
 from itertools import permutations
 from pathlib import Path
@@ -16,9 +15,9 @@ from facesynth.corpus.cells import is_number, read_names
 from facesynth.corpus.importers.description import ORDER, Written
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.motion_files import read_csv, shortened, time_column
-from facesynth.corpus.npz import require_modest
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Kind, Layout
+from facesynth.inference.npz import read_all_arrays
 
 CHANNELS = "channels.txt"
 """Beside weights: the names of the columns, one a line."""
@@ -59,7 +58,7 @@ def read_table(
         motion, remarks = read_csv(path, layout, fps or 1.0, written, only_own_rate=fps is None)
         motion_of_arrays(path, motion.frames, motion.fps, layout)
         return Reading(motion, remarks=remarks)
-    arrays = _npz(path) if path.suffix.lower() == ".npz" else _mat(path)
+    arrays = read_numbers(path) if path.suffix.lower() == ".npz" else _mat(path)
     array, frames = _motion_array(path, arrays, written)
     layout = layout or _named_array(path, frames, otherwise)
     frames, remarks = _in_order(path, frames, layout, written)
@@ -134,7 +133,7 @@ def _named_columns(path: Path, written: Written) -> Layout:
 
 def _named_array(path: Path, frames: NDArray[Any], otherwise: Layout | None) -> Layout:
     """What the array `names` of an NPZ names: points where the motion is [T, K, 3] or [T, K, 2], else curves."""
-    names = [str(name) for name in np.ravel(_npz(path, "U").get("names", []))] if path.suffix.lower() == ".npz" else []
+    names = [str(name) for name in np.ravel(_npz(path).get("names", []))] if path.suffix.lower() == ".npz" else []
     if otherwise is not None and not names:
         return otherwise
     if frames.ndim == 3 and names and len(set(names)) == len(names) == frames.shape[1] and frames.shape[2] in (2, 3):
@@ -163,25 +162,14 @@ def _letters(name: str) -> str:
     return "".join(letter for letter in name.rpartition(".")[2].lower() if letter.isalpha())
 
 
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of an NPZ file that may be damaged; never unpickles."""
+def read_numbers(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of numbers of an NPZ file."""
+    return {name: array for name, array in _npz(path).items() if array.dtype.kind in "fiu"}
+
+
+def _npz(path: Path) -> dict[str, NDArray[Any]]:
     require_file(path)
-    return _npz(path)
-
-
-def _npz(path: Path, kinds: str = "fiu") -> dict[str, NDArray[Any]]:
-    require_modest(path)
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            if not hasattr(stored, "files"):
-                raise FacesynthError(f"{path} holds one array without a name; save it with numpy.savez(file, frames=…, fps=…)")
-            return {name: stored[name] for name in stored.files if stored[name].dtype.kind in kinds}
-    except FacesynthError:
-        raise
-    except (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, MemoryError, zipfile.BadZipFile) as error:
-        raise FacesynthError(f"{path} is no NPZ, or is damaged ({error}); write it again with numpy.savez") from None
-    except Exception as error:  # zlib.error and what else a damaged archive raises
-        raise FacesynthError(f"{path} is damaged ({error}); write it again") from None
+    return read_all_arrays(path, "an NPZ file of numpy.savez")
 
 
 def _mat(path: Path) -> dict[str, NDArray[Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,8 @@ from facesynth.face.draw.subdivision import catmull_clark, refine_corners
 from facesynth.face.rig.anny import PARTS, head_folder, head_key
 from facesynth.face.rig.arkit_rig import Rig, pose
 from facesynth.face.rig.markers import INNER_LIPS, MIDDLE_LIPS
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_all_arrays
 
 _VERSION = 2  # raise it whenever what is baked changes
 _MATERIALS = np.array([SKIN, EYE, EYE, TEETH, TEETH, TONGUE, HIDDEN, HIDDEN, HIDDEN, HIDDEN], np.uint8)
@@ -65,9 +66,8 @@ def baked_head(rig: Rig) -> Baked:
     path = cache_dir("head") / f"look-{_VERSION}-{head_key(head_folder())}.npz"
     if path.is_file():
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-                return _unpacked(dict(stored))
-        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+            return _unpacked(read_all_arrays(path, "the look of a head"))
+        except FacesynthError:
             path.unlink(missing_ok=True)  # damaged: it can be made again
     baked = bake(rig)
     with atomic_path(path) as part:

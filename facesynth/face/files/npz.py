@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from facesynth.atomic import atomic_path
 from facesynth.face.animation import FaceAnimation
-from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.inference.npz import read_arrays
 
 _ANIMATION = ("names", "weights", "head", "gaze", "tongue_up", "fps")
+_BESIDE = ("residual_mm", "frames", "frames_fps", "frames_head", "frames_eyes", "layout")
 
 
 def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None = None) -> None:
@@ -40,14 +40,7 @@ def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None 
 
 def read_npz(path: str | Path) -> tuple[FaceAnimation, Motion | None]:
     """Read what `write_npz` wrote; the motion is None where the file has none."""
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
-        raise FacesynthError(f"{path} is no npz file of facesynth, or is truncated ({error})") from None
-    missing = [name for name in _ANIMATION if name not in arrays]
-    if missing:
-        raise FacesynthError(f"{path} has no {', '.join(missing)}; it was not written by facesynth")
+    arrays = read_arrays(path, "an animation that facesynth wrote", _ANIMATION, _BESIDE)
     names = tuple(str(name) for name in np.atleast_1d(arrays["names"]))
     animation = FaceAnimation(
         names,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.anny import PARTS, build_head, head_folder, head_key
 from facesynth.face.rig.arkit import ARKIT_NAMES, checked_weights, eye_rotations, gaze_weights
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_arrays
 
 PIVOT_MM = np.array([0.0, -105.0, 35.0])
 """The head turns about this point, at the top of the neck."""
@@ -89,9 +89,8 @@ def load_head() -> Rig:
     path = cache_dir("head") / f"head-{head_key(folder)}.npz"
     if path.is_file():
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-                return Rig(**stored)
-        except (OSError, ValueError, TypeError, zipfile.BadZipFile):
+            return Rig(**read_arrays(path, "a head", [field.name for field in fields(Rig)]))
+        except FacesynthError:
             path.unlink(missing_ok=True)  # damaged: it can be built again
     arrays = build_head(folder)
     with atomic_path(path) as part:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.archive import read_arrays
 from facesynth.atomic import atomic_path
 from facesynth.face.texture.mesh import ringed_mesh
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.npz import read_arrays
 from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16
@@ -78,7 +79,7 @@ class Speaker:
         """Read what `save` wrote; FacesynthError for anything else."""
         if not Path(path).is_file():
             raise FacesynthError(f"{path}: no such file; it is made by `facesynth train` beside a model of followed points")
-        arrays = read_arrays(path, [field.name for field in fields(cls)], "pictures of a speaker")
+        arrays: dict[str, Any] = read_arrays(path, "a file of the pictures of a speaker", [field.name for field in fields(cls)])
         speaker = cls(**{**arrays, "fps": float(arrays["fps"])})
         fault = _fault(speaker)
         if fault:

@@ -199,7 +199,7 @@ def test_damaged_npz_files_are_one_clear_error(rig, tmp_path):
         with pytest.raises(FacesynthError, match="npz"):
             read_npz(tmp_path / f"{name}.npz")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
-    with pytest.raises(FacesynthError, match="not written by facesynth"):
+    with pytest.raises(FacesynthError, match="not an animation that facesynth wrote"):
         read_npz(tmp_path / "other.npz")
     np.savez(tmp_path / "pickle.npz", names=np.array([{}], object))
     with pytest.raises(FacesynthError, match="npz"):

@@ -1,0 +1,103 @@
+"""Arrays of NPZ files that may be damaged or a stranger's: they can fail, not harm.
+
+The size is looked at before anything is unpacked, nothing is unpickled, and whatever numpy and zipfile stumble over ends in
+one line.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FacesynthError
+
+LARGEST_BYTES = 2**31
+"""Of a file once unpacked; what is larger is no single recording and no model."""
+LARGEST_HEADER_BYTES = 1 << 16
+"""Of an array in a file."""
+DAMAGE = (
+    *(OSError, ValueError, EOFError, LookupError, TypeError, AttributeError, MemoryError, RuntimeError, ArithmeticError),
+    *(SyntaxError, tokenize.TokenError, struct.error, zlib.error, zipfile.BadZipFile),
+)
+"""What numpy's and zipfile's own code raises on a damaged archive, or on a damaged array in it: each was seen on files with
+bytes changed at random. Only their code runs where these are caught."""
+
+
+def read_arrays(path: str | Path, what: str, required: Iterable[str], optional: Iterable[str] = ()) -> dict[str, NDArray[Any]]:
+    """The required arrays of an NPZ file, and those of the optional ones that it holds.
+
+    FacesynthError where the file is missing, damaged, lacks one, or would unpack to gigabytes; `what` says what it should be.
+    """
+    required = list(required)
+    arrays = _read(Path(path), what, {*required, *optional})
+    if lacking := [name for name in required if name not in arrays]:
+        raise FacesynthError(f"{path} is not {what}: it holds no array {', '.join(map(repr, lacking))}")
+    return arrays
+
+
+def read_all_arrays(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
+    """Every array of an NPZ file; FacesynthError as from `read_arrays`."""
+    return _read(Path(path), what, None)
+
+
+def view_arrays(content: bytes, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Arrays of an uncompressed NPZ as views of its bytes: nothing is copied. FacesynthError for other bytes."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            return {name: _view(content, archive.getinfo(f"{name}.npy")) for name in names}
+    except DAMAGE as error:
+        raise FacesynthError(f"cannot be read ({_reason(error)})") from None
+
+
+def _read(path: Path, what: str, wanted: set[str] | None) -> dict[str, NDArray[Any]]:
+    if not path.is_file():
+        raise FacesynthError(f"{path} is not {what}: the file is missing")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except DAMAGE as error:
+        raise FacesynthError(_no_archive(path, what, error)) from None
+    if size > LARGEST_BYTES:
+        raise FacesynthError(f"{path} would unpack to {size / 1e9:.1f} GB, more than {what} can hold; split it")
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files if wanted is None or name in wanted}
+    except DAMAGE as error:
+        raise FacesynthError(f"{path} is not {what}, or is damaged ({_reason(error)})") from None
+
+
+def _no_archive(path: Path, what: str, error: BaseException) -> str:
+    with open(path, "rb") as file:
+        alone = file.read(len(np.lib.format.MAGIC_PREFIX)) == np.lib.format.MAGIC_PREFIX
+    if alone:
+        return f"{path} is not {what}: it holds one array without a name; save it with numpy.savez(file, frames=…, fps=…)"
+    return f"{path} is not {what}, or is damaged ({_reason(error)})"
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _view(content: bytes, entry: zipfile.ZipInfo) -> NDArray[Any]:
+    """One array where it lies: the local header's two lengths say where its bytes begin, numpy's header what they are."""
+    if entry.compress_type != zipfile.ZIP_STORED:
+        raise ValueError(f"{entry.filename} is compressed")
+    name_bytes, extra_bytes = struct.unpack_from("<HH", content, entry.header_offset + 26)
+    start = entry.header_offset + 30 + name_bytes + extra_bytes
+    member = io.BytesIO(content[start : start + min(entry.file_size, LARGEST_HEADER_BYTES)])
+    version = np.lib.format.read_magic(member)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, in_columns, dtype = read(member)
+    if dtype.hasobject:
+        raise ValueError(f"{entry.filename} holds objects")
+    flat = np.frombuffer(content, dtype, int(np.prod(shape, dtype=np.int64)), start + member.tell())
+    return flat.reshape(shape, order="F" if in_columns else "C")
