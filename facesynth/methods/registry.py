@@ -26,6 +26,7 @@ _BUILT_IN = {
         "mean_face": "baselines.capabilities:MEAN_FACE",
         "phone_mean": "baselines.capabilities:PHONE_MEAN",
         "ridge": "baselines.capabilities:RIDGE",
+        "coarticulation": "coarticulation.capabilities:CAPABILITIES",
         "lds": "lds.capabilities:CAPABILITIES",
         "tcn": "baselines.capabilities:TCN",
         "anime_graph": "anime_graph.capabilities:CAPABILITIES",

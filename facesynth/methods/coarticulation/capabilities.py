@@ -1,0 +1,10 @@
+"""What co-articulation can do."""
+
+from facesynth.methods.capabilities import Capabilities
+
+CAPABILITIES = Capabilities(
+    "coarticulation",
+    "Deng 2006: key shapes of phones, blended by learned functions of time",
+    home="facesynth.methods.coarticulation.method",
+    minutes=1.0,
+)
