@@ -84,6 +84,10 @@ class KeyShapes:
     """[V, V, D] change of a phone of the second class after one of the first."""
     right: Floats
     """[V, V, D] change of a phone of the first class before one of the second."""
+    far_left: Floats
+    """[V, D] change two phones after one of a class."""
+    far_right: Floats
+    """[V, D] change two phones before one of a class."""
     pace: Floats
     """[V, D] change for each unit of the logarithm of the length over the usual one."""
     usual_s: Floats
@@ -94,6 +98,8 @@ class KeyShapes:
         shapes = self.phones[numbers] + pace_of(lengths_s, self.usual_s[classes])[:, None] * self.pace[classes]
         shapes[1:] += self.left[classes[:-1], classes[1:]]
         shapes[:-1] += self.right[classes[:-1], classes[1:]]
+        shapes[2:] += self.far_left[classes[:-2]]
+        shapes[:-2] += self.far_right[classes[2:]]
         return shapes
 
 

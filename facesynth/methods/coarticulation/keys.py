@@ -9,6 +9,8 @@ import numpy as np
 from facesynth.inference.coarticulation import Floats, Ints, KeyShapes, pace_of
 from facesynth.inference.phones import PHONES, VISEME_CLASSES, viseme_of
 
+FAR = 3.0
+"""How many times as strongly changes by phones two away are drawn to nothing as those by neighbours."""
 USUAL_S = 0.08
 """Length of a phone of a class that was never recorded, s."""
 CLASS_OF = np.array([viseme_of(phone) for phone in PHONES])
@@ -22,10 +24,8 @@ class PhoneSamples:
     """[N, D]"""
     phones: Ints
     """[N] index of the phone."""
-    before: Ints
-    """[N] viseme class of the phone before, -1 at the start of a recording."""
-    after: Ints
-    """[N] viseme class of the phone after, -1 at the end."""
+    around: Ints
+    """[N, 4] viseme classes of the phones two before, one before, one after and two after; -1 beyond the recording."""
     lengths_s: Floats
     """[N]"""
 
@@ -41,20 +41,37 @@ def learn_keys(samples: PhoneSamples, *, shrink: float, context: float) -> KeySh
     usual_s = np.array([np.exp(_mean(np.log(samples.lengths_s[classes == c]), np.log(USUAL_S))) for c in range(size)])
     class_means = np.stack([_mean(samples.shapes[classes == c], np.zeros(width)) for c in range(size)])
     own = np.stack([_drawn(samples.shapes[samples.phones == n], class_means[CLASS_OF[n]], shrink) for n in range(len(PHONES))])
-    nothing = KeyShapes(own, np.zeros((size, size, width)), np.zeros((size, size, width)), np.zeros((size, width)), usual_s)
     if not context or not len(samples.phones):
-        return nothing
-    # One column for each pair of classes on either side, and one for the length in each class.
-    before, after = samples.before >= 0, samples.after >= 0
-    design = np.zeros((len(classes), 2 * size**2 + size))
-    rows = np.arange(len(classes))
-    design[rows[before], samples.before[before] * size + classes[before]] = 1
-    design[rows[after], size**2 + classes[after] * size + samples.after[after]] = 1
-    design[rows, 2 * size**2 + classes] = pace_of(samples.lengths_s, usual_s[classes])
-    residual = samples.shapes - own[samples.phones]
-    changes = np.linalg.solve(design.T @ design + context * np.eye(design.shape[1]), design.T @ residual)
-    left, right, pace = np.split(changes, [size**2, 2 * size**2])
-    return KeyShapes(own, left.reshape(size, size, -1), right.reshape(size, size, -1), pace, usual_s)
+        pairs, singles = np.zeros((size, size, width)), np.zeros((size, width))
+        return KeyShapes(own, pairs, pairs, singles, singles, singles, usual_s)
+    parts = _design(samples, classes, pace_of(samples.lengths_s, usual_s[classes]))
+    design = np.hstack(parts)
+    strength = context * np.repeat([1, 1, FAR, FAR, 1], [part.shape[1] for part in parts])
+    changes = np.linalg.solve(design.T @ design + np.diag(strength), design.T @ (samples.shapes - own[samples.phones]))
+    left, right, far_left, far_right, pace = np.split(changes, np.cumsum([part.shape[1] for part in parts])[:-1])
+    pair = (size, size, width)
+    return KeyShapes(own, left.reshape(pair), right.reshape(pair), far_left, far_right, pace, usual_s)
+
+
+def _design(samples: PhoneSamples, classes: Ints, pace: Floats) -> list[Floats]:
+    """Columns of the regression: pairs with the phone before and after, classes two away, length by class."""
+    size = len(VISEME_CLASSES)
+    far_left, before, after, far_right = samples.around.T
+    return [
+        _one_hot(np.where(before >= 0, before * size + classes, -1), size**2),
+        _one_hot(np.where(after >= 0, classes * size + after, -1), size**2),
+        _one_hot(far_left, size),
+        _one_hot(far_right, size),
+        _one_hot(classes, size) * pace[:, None],
+    ]
+
+
+def _one_hot(numbers: Ints, size: int) -> Floats:
+    """[N, size] a 1 at each number, nothing where it is -1."""
+    rows = np.zeros((len(numbers), size))
+    known = np.flatnonzero(numbers >= 0)
+    rows[known, numbers[known]] = 1
+    return rows
 
 
 def _mean(values: Floats, otherwise: Floats) -> Floats:

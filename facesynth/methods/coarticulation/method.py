@@ -60,11 +60,11 @@ class Coarticulation(Method):
         self,
         components: float = 12,
         degree: int = 3,
-        stiffness: float = 0.5,
+        stiffness: float = 0.1,
         pull: float = 20.0,
-        triphones: int = 4,
+        triphones: int = 20,
         shrink: float = 8.0,
-        context: float = 4.0,
+        context: float = 10.0,
     ) -> None:
         super().__init__()
         if degree < 1 or min(stiffness, pull, triphones, shrink, context) < 0 or components <= 0:

@@ -44,15 +44,16 @@ def track_of(frames: Floats, phones: PhoneTrack, fps: float) -> Track:
 
 def samples_of(tracks: Iterable[Track]) -> PhoneSamples:
     """The middle frames of all phones that have one."""
-    parts: list[list[np.ndarray]] = [[], [], [], [], []]
+    shapes, numbers, around, lengths_s = [], [], [], []
     for track in tracks:
-        shapes, classes = track.frames[track.middles], track.classes
-        edge = np.array([-1])
-        columns = (shapes, track.numbers, np.concatenate([edge, classes[:-1]]), np.concatenate([classes[1:], edge]), track.lengths_s)
-        there = np.isfinite(shapes).all(axis=1)
-        for part, column in zip(parts, columns, strict=True):
-            part.append(column[there])
-    return PhoneSamples(*(np.concatenate(part) for part in parts))
+        middle = track.frames[track.middles]
+        there = np.isfinite(middle).all(axis=1)
+        padded = np.pad(track.classes, 2, constant_values=-1)
+        shapes.append(middle[there])
+        numbers.append(track.numbers[there])
+        around.append(np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=1)[there])
+        lengths_s.append(track.lengths_s[there])
+    return PhoneSamples(*(np.concatenate(column) for column in (shapes, numbers, around, lengths_s)))
 
 
 def transitions_of(tracks: Iterable[Track], over: int, stiffness: float) -> Transitions:
