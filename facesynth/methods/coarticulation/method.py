@@ -55,6 +55,10 @@ class Coarticulation(Method):
     """[C] the pose from which key shapes are displacements."""
     basis: Tensor
     """[C, D] components of the displacement, orthonormal."""
+    diphones: Tensor
+    triphone_keys: Tensor
+    triphones: Tensor
+    """See `WeightModels`."""
 
     def __init__(
         self,
@@ -124,8 +128,7 @@ class Coarticulation(Method):
 
     def models(self) -> WeightModels:
         """How they blend."""
-        parts = {name: _array(getattr(self, name)) for name in MODEL_FIELDS}
-        return WeightModels(**{**parts, "triphone_keys": parts["triphone_keys"].astype(np.int64)})
+        return WeightModels(_array(self.diphones), self.triphone_keys.cpu().numpy().astype(np.int64), _array(self.triphones))
 
     def _keep(self, rest: Floats, basis: Floats, keys: KeyShapes, models: WeightModels) -> None:
         arrays = {"rest": rest, "basis": basis}

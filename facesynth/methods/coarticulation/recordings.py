@@ -53,7 +53,7 @@ def samples_of(tracks: Iterable[Track]) -> PhoneSamples:
         numbers.append(track.numbers[there])
         around.append(np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=1)[there])
         lengths_s.append(track.lengths_s[there])
-    return PhoneSamples(*(np.concatenate(column) for column in (shapes, numbers, around, lengths_s)))
+    return PhoneSamples(np.concatenate(shapes), np.concatenate(numbers), np.concatenate(around), np.concatenate(lengths_s))
 
 
 def transitions_of(tracks: Iterable[Track], over: int, stiffness: float) -> Transitions:
@@ -74,7 +74,7 @@ def transitions_of(tracks: Iterable[Track], over: int, stiffness: float) -> Tran
         numbers.append(np.full(len(t), number))
     if not times:
         return Transitions(np.zeros((0, over), np.int64), np.zeros(0), np.zeros((0, over)), np.zeros(0, np.int64))
-    return Transitions(*(np.concatenate(column) for column in (classes, times, weights, numbers)))
+    return Transitions(np.concatenate(classes), np.concatenate(times), np.concatenate(weights), np.concatenate(numbers))
 
 
 def _pieces(tracks: Iterable[Track], over: int) -> Iterator[tuple[Floats, Floats, Ints]]:

@@ -41,7 +41,7 @@ def fit_polynomials(times: Floats, weights: Floats, degree: int, towards: Floats
         grid = np.vander(GRID, degree + 1, increasing=True)
         share = pull / len(GRID)
         gram, right = gram + share * grid.T @ grid, right + share * grid.T @ (grid @ towards.T)
-    return np.linalg.lstsq(gram, right, rcond=None)[0].T
+    return np.asarray(np.linalg.lstsq(gram, right, rcond=None)[0].T)
 
 
 def learn_models(
