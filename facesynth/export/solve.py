@@ -16,7 +16,8 @@ from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
-from facesynth.face.solve.blendshapes import GAP_WEIGHT, SMOOTHING_S, MarkerBasis, follow_gap, solve
+from facesynth.face.solve.blendshapes import GAP_WEIGHT, MarkerBasis, follow_gap
+from facesynth.face.solve.bounded import SMOOTHING_S, solve
 from facesynth.inference.layout import Layout
 
 STEPS = 6000

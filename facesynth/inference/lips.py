@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .errors import FacesynthError
 from .layout import Layout
@@ -23,11 +23,15 @@ def has_lips(layout: Layout) -> bool:
     return layout.dimension > 1 and bool(layout.lip_pairs)
 
 
+def heights_between(points: NDArray[Any], pairs: ArrayLike) -> NDArray[Any]:
+    """[..., P] height of the upper over the lower point of each pair [P, 2] among points [..., K, 2 or 3]; y is up."""
+    upper, lower = np.asarray(pairs).T
+    return points[..., upper, 1] - points[..., lower, 1]
+
+
 def pair_gaps(frames: NDArray[Any], layout: Layout) -> NDArray[Any]:
     """[T, pairs] height of the upper over the lower point of each lip pair, in the layout's unit; see `has_lips`."""
-    upper, lower = np.array(layout.lip_pairs).T
-    heights = layout.points(frames)[..., 1]
-    return heights[:, upper] - heights[:, lower]
+    return heights_between(layout.points(frames), layout.lip_pairs)
 
 
 def gap(frames: NDArray[Any], layout: Layout) -> NDArray[Any]:

@@ -5,7 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import lsq_linear
 
-from facesynth.face.solve.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve, solve_markers
+from facesynth.face.solve.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve_markers
+from facesynth.face.solve.bounded import solve
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 

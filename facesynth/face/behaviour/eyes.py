@@ -2,8 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
+
+from facesynth.inference.speech import PhoneTrack
+
+
+class EyeMotion(Protocol):
+    """Whatever moves the eyes of a face that was recorded without them."""
+
+    def __call__(self, head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
+        """[T, 3] as in `Motion.eyes`: opening of the lids (0 shut, 1 open), gaze to the performer's left and up (rad).
+
+        Parameters
+        ----------
+        head : [T, 6] rotation vector (rad) and translation (mm)
+        phones : what is said meanwhile, where that is known
+        """
+        ...
+
 
 BLINK_MEDIAN_S, BLINK_SPREAD = 3.0, 0.5
 """Pauses between blinks are log-normal: median 3.0 s, deviation .5 of the logarithm, so 17 blinks a minute.
@@ -17,6 +36,13 @@ GAZE_SPREAD_RAD = np.radians([2.4, 1.3])
 """Standard deviation of where it rests, sideways and up; one time in three it returns to straight ahead."""
 HEAD_SHARE = 0.6
 """Share of the head's turn that the eyes take back, so that they keep looking at the viewer."""
+
+
+def quiet_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
+    """An `EyeMotion` by constants: blinks and rests at random, whatever is said, and a look held while the head moves."""
+    shut = quiet_blinks(len(head), fps, seed)
+    gaze = quiet_gaze(len(head), fps, seed) + holding_the_viewer(head)
+    return np.concatenate([1 - shut[:, None], gaze], axis=1)
 
 
 def quiet_blinks(count: int, fps: float, seed: int) -> NDArray[np.float64]:

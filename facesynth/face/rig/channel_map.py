@@ -115,7 +115,7 @@ def on_channels(animation: FaceAnimation, channel_map: ChannelMap) -> FaceAnimat
 
 def _bounded(basis: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights [T, 52] in 0..1 whose channels `weights @ basis` [52, M] come closest to wanted [T, M]."""
-    from facesynth.face.solve.blendshapes import solve
+    from facesynth.face.solve.bounded import solve
 
     weights = np.zeros((len(wanted), len(basis)))
     seen = np.abs(basis).sum(axis=1) > 0

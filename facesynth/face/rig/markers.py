@@ -12,6 +12,7 @@ from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.inference.lips import heights_between
 
 HEAD_MARKERS: Mapping[str, tuple[tuple[str, int], ...]] = {
     "forehead": (
@@ -113,11 +114,9 @@ class LipGap:
     @classmethod
     def of(cls, rig: Rig) -> LipGap:
         """Read the gaps off a rig."""
-        upper, lower = rig.from_source(np.array(INNER_LIPS).T)
-        return cls(
-            (rig.rest_mm[upper] - rig.rest_mm[lower])[:, 1].astype(np.float64),
-            (rig.shapes_mm[:, upper, 1] - rig.shapes_mm[:, lower, 1]).T.astype(np.float64),
-        )
+        pairs = rig.from_source(np.array(INNER_LIPS))
+        rest_mm, slopes_mm = heights_between(rig.rest_mm, pairs), heights_between(rig.shapes_mm, pairs).T
+        return cls(rest_mm.astype(np.float64), slopes_mm.astype(np.float64))
 
     def gaps_mm(self, weights: ArrayLike) -> NDArray[np.float64]:
         """[T, 7] gaps under weights [T, 52]; negative where the lips would pass through each other."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.behaviour.eyes import holding_the_viewer, quiet_blinks, quiet_gaze
+from facesynth.face.behaviour.eyes import EyeMotion, quiet_eyes
 from facesynth.face.behaviour.tongue import TIP_OUT, TIP_UP, tongue_track
 from facesynth.face.rig.arkit import ARKIT_NAMES, BLINKS, arkit_columns, gaze_of, gaze_weights
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
@@ -31,12 +31,13 @@ def animate(
     eyes_gain: float = 1.0,
     seed: int = 0,
     phones: PhoneTrack | None = None,
+    eyes: EyeMotion = quiet_eyes,
 ) -> FaceAnimation:
     """Put a motion on a rig, at the motion's rate.
 
     Points become weights by bounded least squares on the rig, wherever they lie on it (`fit_layout`); curves with ARKit
     names pass through, and where no curve has such a name all keep their own. Blinks and
-    gaze are the motion's own where it has them, otherwise quiet ones by `seed`. The tongue follows `phones`, and so do
+    gaze are the motion's own where it has them, otherwise made by `eyes` and `seed`. The tongue follows `phones`, and so do
     the lips of another performer's points at p, b and m; those lips never pass through each other.
 
     Parameters
@@ -49,12 +50,13 @@ def animate(
             raise FacesynthError(f"{name} must be 0 (off) or a positive factor; got {gain}")
     _check_whole(motion)
     head = _head_on(rig, motion, head_gain)
-    gaze = _gaze(motion, head, seed) * eyes_gain
+    made = eyes(head, motion.fps, phones, seed)
+    gaze = _gaze(motion, made) * eyes_gain
     if motion.layout.kind == "curves" and not arkit_columns(motion.layout):
         values = np.clip(motion.frames, 0, 1)
         return FaceAnimation(motion.layout.names, values, head, gaze, np.zeros(len(motion)), motion.fps)
     weights, residual = _weights(motion, rig, phones)
-    shut = _lids(motion, weights, seed) if eyes_gain else np.zeros(len(motion))
+    shut = _lids(motion, weights, made) if eyes_gain else np.zeros(len(motion))
     _set_lids(weights, shut, awake=eyes_gain == 0)
     weights = gaze_weights(weights, gaze)
     weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
@@ -122,23 +124,20 @@ def _pose_centre(rig: Rig, motion: Motion) -> NDArray[np.float64]:
     return rig.rest_mm[marker_vertices(rig, layout)[rigid]].mean(axis=0).astype(np.float64)
 
 
-def _gaze(motion: Motion, head: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+def _gaze(motion: Motion, made: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[T, 2] the motion's own gaze where it has one, else the one that was made for it."""
     if motion.eyes is not None:
         return motion.eyes[:, 1:].astype(np.float64)
     curves = {f"eyeLook{way}Left" for way in ("In", "Out", "Up", "Down")} & set(motion.layout.names)
-    if curves:
-        return gaze_of(_curves(motion))
-    return quiet_gaze(len(motion), motion.fps, seed) + holding_the_viewer(head)
+    return gaze_of(_curves(motion)) if curves else made[:, 1:]
 
 
-def _lids(motion: Motion, weights: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+def _lids(motion: Motion, weights: NDArray[np.float64], made: NDArray[np.float64]) -> NDArray[np.float64]:
     """[T] how far blinks shut the lids, on top of what the expression does."""
     if motion.eyes is not None:
         return np.clip(1 - motion.eyes[:, 0].astype(np.float64), 0, 1)
     seen = weights[:, [ARKIT_NAMES.index(name) for name in BLINKS]].min(axis=1)
-    if (seen > ALREADY_BLINKS).any():
-        return np.zeros(len(motion))
-    return quiet_blinks(len(motion), motion.fps, seed)
+    return np.zeros(len(motion)) if (seen > ALREADY_BLINKS).any() else 1 - made[:, 0]
 
 
 def _set_lids(weights: NDArray[np.float64], shut: NDArray[np.float64], *, awake: bool) -> None:
