@@ -71,8 +71,9 @@ def perform(
     lively = motion
     if motion.head is None:
         lively = replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), stage.seed))
-    gains = {"head_gain": stage.head_gain, "eyes_gain": stage.eyes_gain}
-    animation = animate(lively, rig, seed=stage.seed, phones=speech.phones, **gains).resampled(stage.fps)
+    animation = animate(
+        lively, rig, head_gain=stage.head_gain, eyes_gain=stage.eyes_gain, seed=stage.seed, phones=speech.phones
+    ).resampled(stage.fps)
     return Performance(speech, motion, animation, _skin(motion, animation, rig, stage))
 
 
