@@ -11,10 +11,10 @@ demo: $(READY)
 	$(BIN)/facesynth demo
 
 test: $(LANDMARKS) lint
-	$(BIN)/python -m pytest -n 2 -rs -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -rs -m "not slow"
 
 test-slow: $(LANDMARKS)
-	$(BIN)/python -m pytest -n 2 -rs -m slow
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -rs -m slow
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -9,6 +9,17 @@ import pytest
 RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Tests that share what was trained or built run in one process: those of a file, and all of tests/export.
+
+    With `--dist loadgroup`, as `make test` says; else each process would build the fixtures of nearly every file anew.
+    """
+    for item in items:
+        group = item.path.parent if item.path.parent.name == "export" else item.path
+        item.add_marker(pytest.mark.xdist_group(str(group.relative_to(item.config.rootpath))))
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The checkout: configs, train and export lie beside the package."""
