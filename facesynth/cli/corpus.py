@@ -158,15 +158,16 @@ def add(
     from facesynth.corpus.record import read_listed
 
     about = {name: value for name, value in about.items() if value is not None}
+    listed = read_listed(list_file) if list_file else None
     where, said = (box, mask) if points or box or mask else None, Said(layout_file, fps, axes)
-    corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about), where, face, said, workers)
+    corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about, listed), where, face, said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)
     with cut_for(sound, files) as cuts:
         report = add_recordings(
             corpus,
             (*files, *cuts.sounds),
             known,
-            listed=read_listed(list_file) if list_file else None,
+            listed=listed,
             texts=texts,
             phones=phones,
             emotions=emotions,
@@ -297,10 +298,14 @@ def _corpus_for(
     return corpus_from_video(folder, files, header, face=face, workers=workers), ()
 
 
-def _header(folder: Path, performer: str | None, about: Mapping[str, Any]) -> dict[str, Any]:
+def _header(
+    folder: Path, performer: str | None, about: Mapping[str, Any], listed: Mapping[str, Mapping[str, Any]] | None
+) -> dict[str, Any]:
+    """What is said of a new corpus; its emotions are the usual ones and those of its recordings."""
+    said = [facts["emotion"] for facts in (about, *(listed or {}).values()) if "emotion" in facts]
     return {
         "performer": performer or folder.resolve().name,
-        "emotions": list(dict.fromkeys([*EMOTIONS, about.get("emotion", EMOTIONS[0])])),
+        "emotions": list(dict.fromkeys([*EMOTIONS, *said])),
         "licence": about.get("licence", ""),
         "consent": about.get("consent", ""),
     }
@@ -359,11 +364,19 @@ def _show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
 
 
 def _listing(what: str, reasons: Mapping[str, str]) -> list[str]:
-    return [f"{what}: {name}: {reason}" for name, reason in reasons.items()]
+    return [f"{what}: {line}" for line in _remarks({name: [reason] for name, reason in reasons.items()})]
 
 
 def _remarks(remarks: Mapping[str, Iterable[str]]) -> list[str]:
-    return [f"{name}: {remark}" for name, said in remarks.items() for remark in said]
+    """A line for each remark; one that is the same of several recordings is said once, with their number."""
+    names: dict[str, list[str]] = {}
+    for name, said in remarks.items():
+        for remark in said:
+            names.setdefault(remark, []).append(name)
+    return [
+        f"{alike[0]}: {remark}" if len(alike) == 1 else f"{len(alike)} recordings ({_some(alike)}): {remark}"
+        for remark, alike in names.items()
+    ]
 
 
 def _leave_if_nothing(nothing: bool, reasons: Mapping[str, str], what: str) -> None:

@@ -7,19 +7,17 @@ from pathlib import Path
 
 from facesynth.inference.errors import FacesynthError
 
-AUDIO_SUFFIXES = (
-    ".wav", ".flac", ".ogg", ".mp3", ".m4a", ".aac", ".aiff", ".aif", ".opus", ".mp4", ".mov", ".mkv", ".mpg", ".avi",
-)  # fmt: skip
-
 
 def recordings(paths: Iterable[Path]) -> list[Path]:
     """The files named, and those inside the folders named; FacesynthError where there is none."""
+    from facesynth.corpus.add.recordings import AUDIO, VIDEO
+
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO_SUFFIXES)
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO | VIDEO and not p.name.startswith("."))
             if not inside:
-                raise FacesynthError(f"{path} holds no sound; wanted files such as clip{AUDIO_SUFFIXES[0]}")
+                raise FacesynthError(f"{path} holds no sound; wanted files such as clip.wav")
             found += inside
         elif path.exists():
             found.append(path)

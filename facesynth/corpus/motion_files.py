@@ -98,9 +98,14 @@ def read_csv(
     written = written or Written()
     columns, table = read_cells(path, written.separator, written.decimal)
     wanted = channel_names(layout)
-    if not columns and len(table) and table.shape[1] == len(wanted):
+    remarks: list[str] = []
+    if written.columns:
+        places, time = written.picked_from(table.shape[1]), time_column(columns, written, wanted) if columns else None
+        if len(places) != len(wanted):
+            raise FacesynthError(f"{path}: {len(places)} columns are picked; the layout has {len(wanted)} channels")
+    elif not columns and len(table) and table.shape[1] == len(wanted):
         places, time = list(range(len(wanted))), None
-        remarks: list[str] = ["the columns have no names; they were taken in the layout's order"]
+        remarks = ["the columns have no names; they were taken in the layout's order"]
     else:
         time = time_column(columns, written, wanted)
         places = [_column(path, channel, columns) for channel in wanted]

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-MOST = 1 << 18
+MOST_MULTIPLICATIONS = 1 << 18
 """Multiplications in one call: above, numpy's BLAS starts threads, which spin, cost more than they gain at these sizes, and
 are not what was asked for with `threads`."""
 
 
 def product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """[m, n] a [m, k] @ b [k, n], a few rows at a time."""
-    rows = max(1, MOST // max(b.size, 1))
+    rows = max(1, MOST_MULTIPLICATIONS // max(b.size, 1))
     if len(a) <= rows:
         return a @ b
     b, out = np.ascontiguousarray(b), np.empty((len(a), b.shape[1]))

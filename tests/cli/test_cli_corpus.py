@@ -79,6 +79,22 @@ def test_a_list_tells_recordings_apart(tmp_path, layout_file, session):
     assert records == {"s00_happy_t1": ("happy", 1), "s00_neutral_t2": ("neutral", 2), "s00_neutral_t1": ("sad", 1)}
 
 
+def test_a_new_corpus_has_the_emotions_of_its_list(tmp_path, session, layout_file):
+    table = tmp_path / "list.csv"
+    table.write_text("id,emotion\ns00_happy_t1,ecstatic\ns00_neutral_t2,bored\n", encoding="utf-8")
+    run("add", tmp_path / "c", session, "--layout", layout_file, "--list", table)
+    corpus = Corpus.open(tmp_path / "c")
+    assert corpus.emotions == ("neutral", "happy", "angry", "sad", "ecstatic", "bored")
+    assert {record.emotion for record in corpus.records} == {"ecstatic", "bored", "neutral"}
+
+
+def test_a_remark_about_many_recordings_is_made_once(tmp_path, layout_file, session):
+    run("new", tmp_path / "c", "--performer", "A", "--layout", layout_file, "--fps", 60)
+    out = run("add", tmp_path / "c", session)
+    assert out.count("resampled from 120 to 60 fps") == 1
+    assert "3 recordings (s00_happy_t1, s00_neutral_t1, s00_neutral_t2): resampled" in out
+
+
 def test_a_layout_may_come_from_another_corpus(tmp_path):
     corpus = tiny_corpus(tmp_path / "tiny", 1)
     run("new", tmp_path / "c", "--performer", "A", "--layout", corpus.files.header, "--fps", 30)

@@ -78,6 +78,19 @@ def run(*arguments):
     return CliRunner().invoke(cli, list(map(str, arguments)))
 
 
+def test_groups_that_a_layout_file_states_are_not_added_to(tmp_path):
+    mocap(tmp_path / "session", takes=1)
+    lines = f"kind: markers\nnames: [{', '.join(FACE)}]\ngroups: {{jaw: [chin], rigid: [{', '.join(RIGID)}]}}\n"
+    (tmp_path / "layout.yaml").write_text(lines)
+    done = run("corpus", "add", tmp_path / "actor", tmp_path / "session", "--layout", tmp_path / "layout.yaml", "--jobs", 1)
+    assert done.exit_code == 0, done.output
+    layout = Corpus.open(tmp_path / "actor").layout
+    assert {name: [layout.names[k] for k in members] for name, members in layout.groups.items()} == {
+        "jaw": ["chin"],
+        "rigid": list(RIGID),
+    }
+
+
 def test_a_folder_of_c3d_becomes_a_corpus_in_one_command(tmp_path):
     openings = mocap(tmp_path / "session")
     done = run("corpus", "add", tmp_path / "actor", tmp_path / "session", "--jobs", 1)
@@ -239,6 +252,24 @@ def test_a_table_with_semicolons_and_decimal_commas(tmp_path):
     assert read(tmp_path / "a.csv", fps=250).motion.layout.names == ("Kinn", "Lippe"), "it names its points itself"
     with pytest.raises(FacesynthError, match="does not state its rate"):
         read(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("shape", [(40, 14), (40, 2, 7)])
+def test_a_layout_file_picks_some_values_of_each_sensor(tmp_path, shape):
+    """Two sensors with seven values each, of which three are the place."""
+    values = np.random.default_rng(0).normal(size=shape)
+    np.savez(tmp_path / "a.npz", frames=values, fps=100.0)
+    lines = "kind: markers\nnames: [A, B]\nfiles: {columns: %s}\n"
+    (tmp_path / "layout.yaml").write_text(lines % '"1-3,8-10"')
+    points = read(tmp_path / "a.npz").motion.points
+    np.testing.assert_allclose(points, values.reshape(40, 2, 7)[:, :, :3], rtol=1e-6)
+    np.savetxt(tmp_path / "b.csv", values.reshape(40, 14), delimiter=",", fmt="%.9f")
+    np.testing.assert_allclose(read(tmp_path / "b.csv", fps=100).motion.points, points, atol=1e-6)
+    faults = {'"1-3,13-15"': "only 14", "[1, 2]": r"must have shape \[T, 6\]", '"0-2"': "from 1 on", "[3-1]": "from 1 on"}
+    for columns, why in faults.items():
+        (tmp_path / "layout.yaml").write_text(lines % columns)
+        with pytest.raises(FacesynthError, match=why):
+            read(tmp_path / "a.npz")
 
 
 def test_a_table_of_other_columns_is_told_in_a_line(tmp_path):

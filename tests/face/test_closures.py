@@ -6,7 +6,7 @@ import pytest
 from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.markers import LipGap, marker_layout
 from facesynth.face.solve.animate import animate
-from facesynth.face.solve.closures import MOST_MM, from_shut, with_lips_apart, with_lips_met
+from facesynth.face.solve.closures import LARGEST_CLOSURE_MM, from_shut, with_lips_apart, with_lips_met
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
@@ -60,7 +60,7 @@ def test_what_most_closures_leave_open_is_shut_elsewhere_too_and_a_wide_mouth_st
 
 
 def test_a_mouth_that_is_open_at_a_b_stays_so(lips):
-    before = jaw(lips, MOST_MM + 2)
+    before = jaw(lips, LARGEST_CLOSURE_MM + 2)
     np.testing.assert_array_equal(with_lips_met(before, lips, PHONES, FPS), before)
 
 

@@ -23,7 +23,7 @@ COUNT = 200
 """Points of the lower face that are looked for (Saisan 2004, §5); a quarter of it on the upper face."""
 KEPT_SHARE = 0.6
 """Points found in a smaller share of the first clips' frames are given up; a clip in which fewer are found is refused."""
-FEWEST = 12
+FEWEST_POINTS = 12
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,16 @@ class Reference:
         """Shi-Tomasi corners of the first clip's first picture that can be followed through all clips."""
         picture = grey(clips[0].frames[:1])[0]
         lower, upper = corners(picture, region.lower, count), corners(picture, region.upper, count // 4)
-        if len(lower) < FEWEST:
+        if len(lower) < FEWEST_POINTS:
             raise FacesynthError(
-                f"only {len(lower)} points stand out in the lower face, at least {FEWEST} are needed; check the box or the mask, "
-                "or give video that is sharper and better lit"
+                f"only {len(lower)} points stand out in the lower face, at least {FEWEST_POINTS} are needed; check the box "
+                "or the mask, or give video that is sharper and better lit"
             )
         start = np.concatenate([lower, upper])
         paths = [follow_clip(grey(clip.frames), picture, start) for clip in track(clips, "choosing points")]
         kept = np.mean(np.concatenate([np.isfinite(path[:, :, 0]) for path in paths]), axis=0) >= KEPT_SHARE
         remaining = int(kept[: len(lower)].sum())
-        if remaining < FEWEST:
+        if remaining < FEWEST_POINTS:
             raise FacesynthError(
                 f"only {remaining} of {len(lower)} points could be followed through the clips; is it one speaker and one camera, "
                 "without cuts?"

@@ -15,7 +15,7 @@ from facesynth.corpus.add.given import DIGITS, FOLDER, GRID, Given, changes, in_
 from facesynth.corpus.add.recordings import VIDEO, Recording
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.importers.unpack import read_into, unpacked, with_unpacked
-from facesynth.corpus.limits import LONGEST_DIFFERENCE_S, MOST_MISSING
+from facesynth.corpus.limits import LARGEST_DIFFERENCE_S, LARGEST_MISSING_SHARE
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import PARTS, Part, hash_file, hash_signals, lost_parts, read_speech
 from facesynth.inference.errors import FacesynthError
@@ -153,8 +153,9 @@ def _again(corpus: Corpus, old: Record, given: Given, changed: frozenset[str], r
         heard, changed, kept = None, changed - {"text", "phones"}, "the phones were corrected by hand; --replace places them anew"
     phones = heard.speech.phones if heard else read_textgrid(corpus.files.phones(old.id))[0]
     emotions = _emotions(corpus, record, recording, take.duration_s)
-    toned = {"emotion", "intensity", "emotions", "sound"} & changed
-    written: dict[Part, bool] = {"sound": captures, "motion": captures, "phones": heard is not None, "emotions": bool(toned)}
+    emotion_changed = {"emotion", "intensity", "emotions", "sound"} & changed
+    written: dict[Part, bool] = {"sound": captures, "motion": captures}
+    written |= {"phones": heard is not None, "emotions": bool(emotion_changed)}
     return Prepared(
         _accounted(record, given, kept, take if captures else None, heard),
         Speech(take.audio, take.sample_rate, phones, emotions, record.text),
@@ -191,12 +192,12 @@ def _captured(corpus: Corpus, recording: Recording, face: int | None) -> _Take:
     audio, rate = load_audio(recording.sound)
     sound_s = len(audio) / rate
     missing = float(np.isnan(motion.frames).mean())
-    if missing > MOST_MISSING:
+    if missing > LARGEST_MISSING_SHARE:
         raise FacesynthError(f"{missing:.0%} of the motion's samples are missing, at most half may be")
     lengths = f"the motion lasts {motion.duration_s:.2f} s, the sound {sound_s:.2f} s"
-    if not 1 - MOST_MISSING <= motion.duration_s / max(sound_s, 1e-9) <= 1 / (1 - MOST_MISSING):
+    if not 1 - LARGEST_MISSING_SHARE <= motion.duration_s / max(sound_s, 1e-9) <= 1 / (1 - LARGEST_MISSING_SHARE):
         raise FacesynthError(f"{lengths}: are they of one recording, and is the motion's rate right?")
-    if abs(motion.duration_s - sound_s) > LONGEST_DIFFERENCE_S:
+    if abs(motion.duration_s - sound_s) > LARGEST_DIFFERENCE_S:
         remarks = (*remarks, f"{lengths}: do they begin together?")
     return _Take(audio, as_saved(audio, rate), rate, motion, remarks)
 

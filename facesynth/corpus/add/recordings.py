@@ -65,7 +65,7 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
             refused[file.name] = f"{file.suffix or 'a file without suffix'} is neither sound, motion, phones nor text"
         else:
             groups.setdefault(name, {}).setdefault(kind, []).append(file)
-    groups = _married(groups)
+    groups = _joined_if_one_pair(groups)
     recordings = []
     for name, found in sorted(groups.items()):
         group = _with_own_sound(_with_video(found))
@@ -103,7 +103,7 @@ def _name_and_kind(file: Path) -> tuple[str, str | None]:
     return name, None
 
 
-def _married(groups: dict[str, dict[str, list[Path]]]) -> dict[str, dict[str, list[Path]]]:
+def _joined_if_one_pair(groups: dict[str, dict[str, list[Path]]]) -> dict[str, dict[str, list[Path]]]:
     """One sound and one motion file alone are one recording, called as the sound."""
     sounds = [name for name, group in groups.items() if "sound" in group]
     motions = [name for name, group in groups.items() if "motion" in group]

@@ -13,7 +13,7 @@ from facesynth.inference.layout import Layout
 
 Floats = NDArray[np.float64]
 
-FEWEST = 5
+FEWEST_POINTS = 5
 BETTER = 0.4
 """The right axes leave less than this share of the distance that those of the file leave."""
 HIGH, LOW = ("forehead", "brows", "eyelids", "upper_face"), ("mouth", "lower_lip", "jaw")
@@ -39,7 +39,7 @@ def axis_problems(file: str, middle: Floats, layout: Layout) -> Iterator[Problem
 def _turn(middle: Floats, rest: Floats) -> Floats | None:
     """[D, D] signed permutation that lays the middle on the rest far better than leaving it; None where there is none."""
     seen = np.isfinite(middle).all(axis=1) & np.isfinite(rest).all(axis=1)
-    if seen.sum() < FEWEST:
+    if seen.sum() < FEWEST_POINTS:
         return None
     a, b = middle[seen] - middle[seen].mean(axis=0), rest[seen] - rest[seen].mean(axis=0)
     a *= np.linalg.norm(b) / max(float(np.linalg.norm(a)), 1e-9)

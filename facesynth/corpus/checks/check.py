@@ -11,6 +11,7 @@ from facesynth.corpus.checks.problem import Problem, attempt
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header, no_corpus, read_header
+from facesynth.corpus.limits import LARGEST_DIFFERENCE_S
 from facesynth.corpus.motion_files import USUAL_FPS
 from facesynth.corpus.record import Record, parse_records
 from facesynth.corpus.signals import read_emotion_track, read_motion
@@ -20,9 +21,6 @@ from facesynth.inference.speech import PhoneTrack
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio, require_sound
 from facesynth.speech.textgrid import read_textgrid
-
-LONGEST_DIFFERENCE_S = 0.1
-"""Sound, phones and motion of one recording may differ by this much in length."""
 
 
 def check(corpus: Corpus | str | Path, methods: Sequence[needs.Need] = ()) -> list[Problem]:
@@ -103,12 +101,12 @@ def _sound_s(path: Path) -> float:
 def _length_problems(name: str, sound_s: float | None, phones: PhoneTrack | None, motion: Motion | None) -> list[Problem]:
     """Sound, phones and motion that do not end together, with the rate that would explain it."""
     problems = []
-    if sound_s is not None and phones is not None and abs(phones.duration_s - sound_s) > LONGEST_DIFFERENCE_S:
+    if sound_s is not None and phones is not None and abs(phones.duration_s - sound_s) > LARGEST_DIFFERENCE_S:
         what = f"the phones end at {phones.duration_s:.2f} s, the sound at {sound_s:.2f} s"
         problems.append(Problem(f"phones/{name}.TextGrid", what, "correct the TextGrid, or align it again"))
     length_s = sound_s if sound_s is not None else phones.duration_s if phones is not None else None
-    if motion is not None and length_s is not None and abs(motion.duration_s - length_s) > LONGEST_DIFFERENCE_S:
-        meant = [rate for rate in USUAL_FPS if abs(len(motion) / rate - length_s) < min(LONGEST_DIFFERENCE_S, 0.005 * length_s)]
+    if motion is not None and length_s is not None and abs(motion.duration_s - length_s) > LARGEST_DIFFERENCE_S:
+        meant = [rate for rate in USUAL_FPS if abs(len(motion) / rate - length_s) < min(LARGEST_DIFFERENCE_S, 0.005 * length_s)]
         guess = f"; was it recorded at {min(meant, key=lambda r: abs(len(motion) / r - length_s)):.6g} fps?" if meant else ""
         what = f"the motion lasts {motion.duration_s:.2f} s at {motion.fps:g} fps, the sound {length_s:.2f} s{guess}"
         problems.append(Problem(f"motion/{name}.npz", what, "trim both to the same moment, or add it with the right rate"))

@@ -12,12 +12,12 @@ from facesynth.corpus.checks.problem import Problem
 from facesynth.corpus.checks.swaps import swap_problems
 from facesynth.corpus.checks.units import unit_problems
 from facesynth.corpus.journal import node_name
-from facesynth.corpus.limits import MOST_MISSING as HOPELESS
+from facesynth.corpus.limits import LARGEST_MISSING_SHARE
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.gaps import missing_in, runs
 
-MOST_MISSING = 0.2
+NOTED_MISSING_SHARE = 0.2
 """Share of missing samples above which a recording is hardly worth using."""
 LONGEST_FREEZE_S = 1.0
 """A real face is never still for so long, not even in silence."""
@@ -61,12 +61,12 @@ def _missing(file: str, missing: NDArray[np.bool_], names: NDArray[np.str_]) -> 
     lost = missing.all(axis=0)
     if lost.any():
         yield Problem(file, f"never seen: {', '.join(names[lost])}", "restore the points, or mark the utterance unusable")
-    if missing.mean() > MOST_MISSING:
+    if missing.mean() > NOTED_MISSING_SHARE:
         yield Problem(
             file,
             f"{missing.mean():.0%} of the samples are missing",
             "fill them where they were tracked, or mark it unusable",
-            grave=bool(missing.mean() > HOPELESS),
+            grave=bool(missing.mean() > LARGEST_MISSING_SHARE),
         )
 
 

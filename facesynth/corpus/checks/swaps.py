@@ -74,8 +74,8 @@ def swap_problems(file: str, utterance_id: str, motion: Motion, phones: PhoneTra
             yield Problem(file, f"{what} are swapped throughout", "give them each other's names, or add the recording again")
         else:
             where = _nodes(utterance_id, start / motion.fps, stop / motion.fps, phones)
-            told = f"{what} are swapped from {start / motion.fps:.2f} to {stop / motion.fps:.2f} s{where}"
-            yield Problem(file, told, "look at it; exchange their tracks there, or remove the nodes", grave=False)
+            what_happened = f"{what} are swapped from {start / motion.fps:.2f} to {stop / motion.fps:.2f} s{where}"
+            yield Problem(file, what_happened, "look at it; exchange their tracks there, or remove the nodes", grave=False)
 
 
 # Exchanging markers i and j of a frame x lowers the sum of squared distances from the rest r by

@@ -37,9 +37,9 @@ CONTEXT = 10
 """Frames of sound before and after that the regression sees: 0.2 s."""
 RIDGE = 0.1
 """Share of the features' variance."""
-MOST = 400
+MOST_RECORDINGS = 400
 """Recordings that are looked at, evenly chosen."""
-FEWEST = 8
+FEWEST_RECORDINGS = 8
 """With fewer recordings a regression says nothing."""
 SHARED_S = 0.08
 """A shift that all share is told from here on."""
@@ -69,23 +69,23 @@ class Pair:
 def sync_problems(files: Files, header: Header, records: Iterable[Record]) -> Iterator[Problem]:
     """Recordings whose sound and motion do not belong together as they lie; those that cannot be read are passed over."""
     usable = [record for record in records if record.usable]
-    chosen = usable if len(usable) <= MOST else [usable[i * len(usable) // MOST] for i in range(MOST)]
+    count = min(len(usable), MOST_RECORDINGS)
+    chosen = [usable[i * len(usable) // count] for i in range(count)]
     pairs = [pair for record in track(chosen, "comparing sound and motion") if (pair := _pair(files, header, record)) is not None]
     if not pairs:
         return
     curve = np.mean([correlations(np.log(np.exp(pair.heard).sum(axis=1)), pair.opening) for pair in pairs], axis=0)
     shift_s = float(LAGS[curve.argmax()]) / RATE
     clear = curve.max() - curve[len(LAGS) // 2] >= max(CLEAR / 3, CLEAR_ALONE / len(pairs))
-    peaks = len(pairs) >= FEWEST or (_shows_opening(header.layout) and 0 < curve.argmax() < len(LAGS) - 1)
+    peaks = len(pairs) >= FEWEST_RECORDINGS or (_shows_opening(header.layout) and 0 < curve.argmax() < len(LAGS) - 1)
     shifted = abs(shift_s) >= SHARED_S and clear and peaks
     if shifted:
         whose = "in all recordings the mouth" if len(pairs) > 1 else "the mouth"
         yield Problem("audio", _told(whose, shift_s), _to_do("every sound" if len(pairs) > 1 else "the sound", shift_s))
-    if len(pairs) < FEWEST:
+    if len(pairs) < FEWEST_RECORDINGS:
         unseen = "one whose sound is shifted" if shifted or abs(shift_s) < SHARED_S else "shifted sound"
-        what = (
-            f"{len(pairs)} recording{'s are' if len(pairs) > 1 else ' is'} too few to find {unseen}; at {FEWEST} it is looked for"
-        )
+        these = f"{len(pairs)} recordings are" if len(pairs) > 1 else "1 recording is"
+        what = f"{these} too few to find {unseen}; at {FEWEST_RECORDINGS} it is looked for"
         yield Problem("audio", what, "record more, or look at the pictures of `facesynth corpus stats --pictures`", grave=False)
         return
     for pair, shift_s in lone_shifts(pairs):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -37,6 +38,8 @@ class Written:
     """Which of the files' axes run to the performer's left, up, and out of the face, such as `x,z,-y`."""
     order: str = ""
     """The array's dimensions in order, such as `points,axes,time`."""
+    columns: str = ""
+    """Which of a frame's values are used, counted from 1, in the layout's order, such as `1-3,7-9`; the others are left out."""
     delimiter: str = ""
     """Between the cells of a CSV; the name or the sign."""
     decimal: str = ""
@@ -51,6 +54,7 @@ class Written:
             axis_turns(self.axes)
         if self.order and (set(self.dimensions) - set(ORDER) or len(set(self.dimensions)) != len(self.dimensions)):
             raise FacesynthError(f"order lists {', '.join(ORDER)} (or time and points) in the array's order; got {self.order!r}")
+        self.picked_from(0)
         if self.decimal not in ("", ".", ","):
             raise FacesynthError(f"decimal is . or , ; got {self.decimal!r}")
         if len(self.separator) > 1:
@@ -60,6 +64,21 @@ class Written:
     def dimensions(self) -> tuple[str, ...]:
         """`order` as a tuple."""
         return tuple(part.strip().lower() for part in self.order.split(",")) if self.order else ()
+
+    def picked_from(self, count: int) -> list[int]:
+        """Places of the values that are used, of `count`; all where `columns` says nothing. count 0: whatever there are."""
+        if not self.columns:
+            return list(range(count))
+        places: list[int] = []
+        for part in self.columns.split(","):
+            span = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+            first, last = (int(span[1]), int(span[2] or span[1])) if span else (0, 0)
+            if not 1 <= first <= last:
+                raise FacesynthError(f"columns are numbers from 1 on, or ranges such as 1-3,7-9; got {self.columns!r}")
+            places += range(first - 1, last)
+        if count and max(places) >= count:
+            raise FacesynthError(f"columns name value {max(places) + 1} of a frame, but there are only {count}")
+        return places
 
     @property
     def separator(self) -> str:

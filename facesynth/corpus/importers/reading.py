@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.inference.npz import LARGEST_BYTES
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.segments import Segment
-
-LARGEST_BYTES = 2**31
-"""Files that are larger hold more than one recording, or are damaged."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from facesynth.atomic import write_text
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.importers.axes import axes_by_names
-from facesynth.corpus.importers.description import Description, Written, description_text, read_description, turned
+from facesynth.corpus.importers.description import (
+    Description,
+    Written,
+    description_beside,
+    description_text,
+    read_description,
+    turned,
+)
 from facesynth.corpus.importers.formats import read
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.inference.errors import FacesynthError
@@ -34,13 +41,15 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class Preview:
     """What a recording is, at a glance."""
 
     layout: Layout
     fps: float
     frames: NDArray[np.float32]
     """[N, C] some of its frames."""
+    states_groups: bool = False
+    """Whether a layout file says which points belong together."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +73,16 @@ def survey(
     """
     description = description or Description()
     results = list(spread(partial(_attempt, description=description, fps=fps), paths, workers, "looking at recordings"))
-    sights = [result for result in results if isinstance(result, Sight)]
-    if not sights:
+    previews = [result for result in results if isinstance(result, Preview)]
+    if not previews:
         raise next((result for result in results if isinstance(result, FacesynthError)), FacesynthError("there is no recording"))
-    layout, alike = _most_common(sights)
-    rates = Counter(round(sight.fps, 6) for sight in alike)
+    layout, alike = _most_common(previews)
+    rates = Counter(round(preview.fps, 6) for preview in alike)
     rate = min(rates, key=lambda rate: (-rates[rate], -rate))
     written, remarks = description.written, list[str]()
-    frames = [_picked(sight, layout) for sight in alike]
+    frames = [_picked(preview, layout) for preview in alike]
     if layout.kind == "markers":
-        layout, frames, axes, remarks = _understood(layout, frames, written.axes)
+        layout, frames, axes, remarks = _completed(layout, frames, written.axes, any(preview.states_groups for preview in alike))
         written = replace(written, axes=axes)
     return Session(layout, rate, written, tuple(remarks))
 
@@ -109,31 +118,38 @@ def kept_written(folder: Path) -> Written:
     return read_description(folder / RECORDINGS).written if (folder / RECORDINGS).is_file() else Written()
 
 
-def _attempt(path: Path, description: Description, fps: float | None) -> Sight | FacesynthError:
+def _attempt(path: Path, description: Description, fps: float | None) -> Preview | FacesynthError:
     try:
         motion = read(path, description.layout, fps, description.written).motion
     except FacesynthError as error:
         return error
     places = np.unique(np.linspace(0, len(motion) - 1, LOOKED_AT).round().astype(int))
-    return Sight(motion.layout, motion.fps, motion.frames[places])
+    beside = description_beside(path)
+    stated = description.layout or (beside.layout if beside else None)
+    return Preview(motion.layout, motion.fps, motion.frames[places], bool(stated and stated.groups))
 
 
-def _most_common(sights: Sequence[Sight]) -> tuple[Layout, list[Sight]]:
+def _most_common(previews: Sequence[Preview]) -> tuple[Layout, list[Preview]]:
     """The layout of most recordings (of two as frequent, the one with more points), and those that have all of it."""
-    counts = Counter((sight.layout.kind, frozenset(sight.layout.names)) for sight in sights)
+    counts = Counter((preview.layout.kind, frozenset(preview.layout.names)) for preview in previews)
     kind, names = min(counts, key=lambda key: (-counts[key], -len(key[1]), sorted(key[1])))
-    layout = next(s.layout for s in sights if (s.layout.kind, frozenset(s.layout.names)) == (kind, names))
-    return layout, [sight for sight in sights if sight.layout.kind == kind and names <= set(sight.layout.names)]
+    layout = next(s.layout for s in previews if (s.layout.kind, frozenset(s.layout.names)) == (kind, names))
+    return layout, [preview for preview in previews if preview.layout.kind == kind and names <= set(preview.layout.names)]
 
 
-def _picked(sight: Sight, layout: Layout) -> Floats:
+def _picked(preview: Preview, layout: Layout) -> Floats:
     """[N, K, dimension] frames in another order of points."""
-    places = [sight.layout.names.index(name) for name in layout.names]
-    return sight.layout.points(sight.frames)[:, places].astype(np.float64)
+    places = [preview.layout.names.index(name) for name in layout.names]
+    return preview.layout.points(preview.frames)[:, places].astype(np.float64)
 
 
-def _understood(layout: Layout, recordings: list[Floats], axes: str) -> tuple[Layout, list[Floats], str, list[str]]:
-    """A layout of markers with groups, facing lips and rest pose, the frames and axes that go with them, and remarks."""
+def _completed(
+    layout: Layout, recordings: list[Floats], axes: str, states_groups: bool
+) -> tuple[Layout, list[Floats], str, list[str]]:
+    """A layout of markers with groups, facing lips and rest pose, the frames and axes that go with them, and remarks.
+
+    Groups that a layout file states are not added to.
+    """
     remarks: list[str] = []
     if not axes and (guessed := axes_by_names(layout.names, _together(recordings))):
         axes = guessed
@@ -141,12 +157,12 @@ def _understood(layout: Layout, recordings: list[Floats], axes: str) -> tuple[La
         remarks.append(f"axes taken as {axes} (left, up, out of the face) by the markers' names; --axes says otherwise")
     guess = guess_groups(layout.names, _together(recordings))
     new = {name: members for name, members in guess.groups.items() if name not in layout.groups}
-    if layout.groups and "rigid" not in layout.groups and guess.said != "by their names":
+    if states_groups or (layout.groups and "rigid" not in layout.groups and guess.said != "by their names"):
         new = {}
     pairs = layout.lip_pairs or guess.lip_pairs
     if new or pairs != layout.lip_pairs:
-        told = ", ".join(f"{name} {len(members)}" for name, members in new.items())
-        remarks.append(f"groups of markers told {guess.said}: {told or 'none'}; facing pairs of the lips {len(pairs)}")
+        sizes = ", ".join(f"{name} {len(members)}" for name, members in new.items())
+        remarks.append(f"groups of markers told {guess.said}: {sizes or 'none'}; facing pairs of the lips {len(pairs)}")
     layout = replace(layout, groups={**new, **layout.groups}, lip_pairs=pairs)
     if layout.neutral is None:
         rest = rest_pose(layout, recordings)

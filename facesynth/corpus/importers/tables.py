@@ -111,7 +111,9 @@ def _in_order(path: Path, frames: NDArray[Any], layout: Layout, written: Written
             raise FacesynthError(f"{path}: order names {len(written.dimensions)} dimensions, the array has {frames.ndim}")
         places = [written.dimensions.index(name) for name in ORDER if name in written.dimensions]
         ordered = frames.transpose(places)
-        return ordered.reshape(len(ordered), -1), ()
+        return _picked(path, ordered, written), ()
+    if written.columns:
+        return _picked(path, frames, written), ()
     if frames.ndim == 3:
         fitting = [turn for turn in permutations(range(3)) if frames.transpose(turn).shape[1:] == (count, dimension)]
         if (0, 1, 2) not in fitting and len(fitting) == 1:
@@ -122,6 +124,15 @@ def _in_order(path: Path, frames: NDArray[Any], layout: Layout, written: Written
     if frames.ndim == 2 and frames.shape[0] == layout.channels != frames.shape[1]:
         return frames.T, ("the array's dimensions were taken as channels, time",)
     return frames, ()
+
+
+def _picked(path: Path, frames: NDArray[Any], written: Written) -> NDArray[Any]:
+    """[T, …] as [T, C], with those of each frame's values that are used."""
+    flat = frames.reshape(len(frames), -1)
+    try:
+        return flat[:, written.picked_from(flat.shape[1])]
+    except FacesynthError as error:
+        raise FacesynthError(f"{path}: {error}") from None
 
 
 def _named_columns(path: Path, written: Written) -> Layout:

@@ -16,11 +16,11 @@ from facesynth.face.rig.markers import LipGap
 from facesynth.inference.lips import bilabial_spans
 from facesynth.inference.speech import PhoneTrack
 
-MOST_MM = 3.0
+LARGEST_CLOSURE_MM = 3.0
 """A mouth that stays open wider than this at p, b or m is not shut: its phones or its motion are elsewhere."""
-MOST_SHUT_MM = 2.0
+LARGEST_SHUT_MM = 2.0
 """Points of shut lips stay at most so far apart over the rest pose."""
-FEWEST = 2
+FEWEST_CLOSURES = 2
 """From so many p, b and m on they tell where this performer's lips are shut."""
 FADING_MM = 3.0
 """What is taken off at shut lips fades out over so many millimetres."""
@@ -64,7 +64,7 @@ def with_lips_met(weights: ArrayLike, lips: LipGap, phones: PhoneTrack, fps: flo
     opening_mm = from_shut(opening_mm, [float(opening_mm[first:last].min()) for first, last in spans])
     for first, last in spans:
         moment = first + int(opening_mm[first:last].argmin())
-        if 0 < opening_mm[moment] <= MOST_MM:
+        if 0 < opening_mm[moment] <= LARGEST_CLOSURE_MM:
             bump = np.exp(-0.5 * ((frames - moment) / (WIDTH_S * fps)) ** 2)
             narrower_mm = np.maximum(narrower_mm, opening_mm[moment] * bump)
     return np.clip(lips.closed(weights, np.maximum(opening_mm - narrower_mm, 0.0)), 0, 1)
@@ -72,9 +72,9 @@ def with_lips_met(weights: ArrayLike, lips: LipGap, phones: PhoneTrack, fps: flo
 
 def from_shut(opening_mm: NDArray[np.float64], least_mm: Sequence[float]) -> NDArray[np.float64]:
     """Openings [T] counted from shut lips: 0 where they are as at most p, b and m (least_mm), unchanged where they are wide."""
-    if len(least_mm) < FEWEST:
+    if len(least_mm) < FEWEST_CLOSURES:
         return opening_mm
-    shut_mm = float(np.clip(np.median(least_mm), 0, MOST_SHUT_MM))
+    shut_mm = float(np.clip(np.median(least_mm), 0, LARGEST_SHUT_MM))
     over_mm = np.maximum(opening_mm - shut_mm, 0)
     from_zero = over_mm + shut_mm * -np.expm1(-over_mm / FADING_MM)
     return np.where(opening_mm > 0, np.minimum(from_zero, opening_mm), opening_mm)
