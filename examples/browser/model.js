@@ -3,7 +3,7 @@
 export async function openFolder(read, ort) {
   const text = new TextDecoder().decode(await read("manifest.json"));
   const manifest = JSON.parse(text);
-  if (manifest?.written_by !== "facesynth" || manifest.format !== 2) throw new Error("manifest.json was not written by facesynth export");
+  if (manifest?.written_by !== "facesynth" || manifest.format !== 3) throw new Error("manifest.json was not written by facesynth export");
   await checkManifest(text, manifest);
   const graphs = {};
   for (const [name, entry] of Object.entries(manifest.graphs)) {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_parts
+from facesynth.export.expectation import expectation_graph, predictor_arrays
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
@@ -55,10 +55,8 @@ def anime_graph_content(model: AnimeGraph) -> Content:
     if len(maps.pairs):
         graphs.append(emotion_maps_graph(maps, model.fps))
         arrays["dropped"] = maps.dropped.numpy()
-    more: dict[str, Any] = {}
     if model.predictor is not None:
-        more, learned = predictor_parts(model.predictor)
-        arrays |= learned
+        arrays |= predictor_arrays(model.predictor)
         graphs += [expectation_graph(model.predictor, unit), log_mel_graph(LogMel())]
     return Content(
         graphs=tuple(graphs),
@@ -73,7 +71,6 @@ def anime_graph_content(model: AnimeGraph) -> Content:
             "no_map": model.facts["no_map"],
             "temperature": model.config["temperature"],
             "sharpening": model.config["sharpening"],
-            **more,
         },
         latency={
             "look_ahead_s": None,

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.methods.efase.audio import PLACES, SPAN, PhoneSound
-from facesynth.methods.efase.nodes import Ints
-from facesynth.methods.learn.expectation import PHONE_SIZE, PosePredictor
+from facesynth.inference.efase.exported import SOUND
+from facesynth.methods.efase.audio import PhoneSound
+from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.learn.network import RATE
 
@@ -50,24 +50,17 @@ def _convolved(b: Builder, value: str, layer: torch.nn.Conv1d) -> str:
     return b.op("Conv", value, weight, bias, dilations=[dilation], pads=[reach // 2, reach - reach // 2])
 
 
-def hearing_arrays(hearing: Hearing, name: str) -> dict[str, NDArray[Any]]:
+def predictor_arrays(predictor: PosePredictor) -> dict[str, NDArray[Any]]:
+    """What stands beside the graph."""
+    return _standard(predictor.hearing, "expectation") | {"pose_metric": predictor.metric.cpu().numpy()}
+
+
+def sound_arrays(sound: PhoneSound) -> dict[str, NDArray[Any]]:
+    """What phones sound like."""
+    kept = sound.sounds()
+    return {f"sound_{name}": getattr(kept, name) for name in SOUND} | _standard(sound.hearing, "sound")
+
+
+def _standard(hearing: Hearing, name: str) -> dict[str, NDArray[Any]]:
     """Mean and deviation [40] of the bands."""
     return {f"{name}_mean": hearing.mean.cpu().numpy(), f"{name}_deviation": hearing.deviation.cpu().numpy()}
-
-
-def predictor_parts(predictor: PosePredictor) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Settings and arrays beside the graph."""
-    arrays = hearing_arrays(predictor.hearing, "expectation") | {"pose_metric": predictor.metric.cpu().numpy()}
-    return {"expectation_fps": RATE, "phone_size": PHONE_SIZE}, arrays
-
-
-def sound_parts(sound: PhoneSound, order: Ints) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Settings and arrays of what phones sound like; nodes in the order of the folder."""
-    parts = {
-        "sound_nodes": sound.nodes[torch.from_numpy(order)],
-        "sound_centre": sound.pca.mean,
-        "sound_basis": sound.pca.basis,
-        "sound_size": sound.size,
-    }
-    arrays = {name: tensor.detach().cpu().numpy() for name, tensor in parts.items()}
-    return {"sound_span": list(SPAN), "sound_places": PLACES}, arrays | hearing_arrays(sound.hearing, "sound")

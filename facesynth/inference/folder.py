@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .errors import FacesynthError
 from .npz import view_arrays
 
-FORMAT = 2
+FORMAT = 3
 """Of the manifest: one is written, no other is read."""
 MANIFEST = "manifest.json"
 LARGEST_MANIFEST_BYTES = 1 << 24

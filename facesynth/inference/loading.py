@@ -12,7 +12,7 @@ from .folder import open_folder, stated_by_manifest
 _MODELS = {
     "lds": ".lds:open_lds",
     "emotion": ".emotion:EmotionDetector",
-    "efase": ".efase:Efase",
+    "efase": ".efase.exported:load_efase",
     "anime_graph": ".anime_graph:AnimeGraph",
     "graphs": ".parts:Parts",
 }

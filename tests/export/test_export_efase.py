@@ -3,28 +3,25 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from literal_search import literal
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from facesynth.export.graph import difference
 from facesynth.export.models import export_model
-from facesynth.export.step_bounds import class_order, sorted_nodes, step_bounds
 from facesynth.inference import FacesynthError, load
-from facesynth.inference.efase.bounds import StepBounds
-from facesynth.inference.efase.nodes import Nodes, Query, Weights
-from facesynth.inference.efase.search import Search
+from facesynth.inference.efase import search as engine
+from facesynth.inference.efase.bounds import step_bounds
+from facesynth.inference.efase.costs import Query, Weights, all_targets
+from facesynth.inference.efase.nodes import COLUMNS, Nodes
+from facesynth.inference.efase.search import Search, SearchIndex
+from facesynth.inference.efase.steps import path_cost, step_costs
 from facesynth.inference.efase.stream import GUARD_S
 from facesynth.inference.filters import butterworth, forth_and_back, gaussian, spline_at
 from facesynth.inference.joints import smoothing_spline
 from facesynth.inference.speech import EmotionTrack, Speech
-from facesynth.methods.efase.costs import Query as TorchQuery
-from facesynth.methods.efase.costs import Weights as TorchWeights
-from facesynth.methods.efase.costs import path_cost
-from facesynth.methods.efase.method import NODE_FIELDS, Efase
-from facesynth.methods.efase.nodes import MotionNodes
-from facesynth.methods.efase.plan import part
-from facesynth.methods.efase.search import build_index, search
+from facesynth.methods.efase.method import Efase
 from facesynth.methods.learn import expectation as prediction
 
 
@@ -79,17 +76,16 @@ def doubled_pair(efase_file, tmp_path_factory):
     model, rng, folder = Efase.load(efase_file), np.random.default_rng(7), tmp_path_factory.mktemp("doubled")
     table = model.node_table.numpy()
     count = table.shape[1]
-    columns = dict(zip(NODE_FIELDS, np.hstack([table, table]), strict=True))
-    for name in ("before", "after"):
-        second = columns[name][count:]
-        second[second >= 0] += count
+    columns = dict(zip(COLUMNS, np.hstack([table, table]), strict=True))
+    second = columns["before"][count:]
+    second[second >= 0] += count
     columns["emotions"] = np.where(rng.permuted(np.arange(2 * count).reshape(2, -1), axis=0).ravel() < count, 1, 3)
     order = rng.permutation(2 * count)
-    nodes = sorted_nodes(MotionNodes(model.node_frames.numpy(), **columns), order)
+    nodes = Nodes(model.node_frames.numpy(), **columns).take(order)
     names = [f"{name}{mark}" for mark in ("", "'") for name in model.facts["names"]]
     model.facts["names"] = [names[k] for k in order]
-    model.node_table = torch.from_numpy(np.stack([getattr(nodes, name) for name in NODE_FIELDS]))
-    model._keep_index()
+    model.node_table = torch.from_numpy(np.stack([getattr(nodes, name) for name in COLUMNS]))
+    model._keep_bounds()
     model.save(folder / "model.safetensors")
     export_model(folder / "model.safetensors", folder / "exported")
     return Efase.load(folder / "model.safetensors"), load(folder / "exported")
@@ -112,11 +108,6 @@ OTHERS = [
 ]
 
 
-def runtime_nodes(nodes, weights):
-    columns = (getattr(nodes, name) for name in ("starts", "stops", "phones", "visemes", "emotions", "before"))
-    return Nodes(nodes.frames.astype(np.float32), *columns, np.arange(len(nodes)), weights)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10_000), pnt=st.sampled_from([0.0, 0.5, 5.0, 500.0]), strict=st.booleans(), others=st.sampled_from(OTHERS)
@@ -128,45 +119,36 @@ def test_the_search_is_exact_on_random_databases(seed, pnt, strict, others):
     phones = rng.integers(0, 5, count)
     before = np.where(rng.random(count) < 0.7, np.arange(count) - 1, -1)
     pieces = [rng.standard_normal((n, 3)).astype(np.float32) for n in lengths]
-    nodes = MotionNodes.from_pieces(pieces, phones, phones // 2, rng.integers(0, 2, count), before)
-    weights = TorchWeights(pnt, **others)
-    nodes = sorted_nodes(nodes, class_order(nodes))
-    index, bounds = build_index(nodes, weights), step_bounds(nodes, weights)
-    own = Weights(pnt, weights.alpha, weights.beta, weights.eta, weights.gamma, weights.delta, weights.phi)
-    table = runtime_nodes(nodes, own)
+    nodes = Nodes.from_pieces(pieces, phones, phones // 2, rng.integers(0, 2, count), before)
+    weights = Weights(pnt, **others)
     wanted = rng.integers(0, 5, 8)
     strictly = np.full(8, strict) & np.isin(wanted // 2, nodes.visemes)
     fixed = {3: int(rng.integers(count))} if not strict else {}
-    query = TorchQuery(wanted, wanted // 2, rng.integers(-1, 2, 8), fixed, strictly)
-    best = search(index, query)
-    quest, step_by_step = Search(table, StepBounds(table, bounds)), Search(table, StepBounds(table, bounds))
-    asked = [
-        Query(int(wanted[t]), int(wanted[t] // 2), int(query.emotions[t]), fixed.get(t, -1), bool(strictly[t])) for t in range(8)
-    ]
+    query = Query(wanted, wanted // 2, rng.integers(-1, 2, 8), fixed, strictly)
+    index = SearchIndex(nodes, weights, step_bounds(nodes, weights))
+    cost, _ = literal(nodes, query, weights)
+    targets, step_by_step = all_targets(nodes, query, weights), Search(index)
+    path = index.cheapest_path(targets)
+    assert path_cost(nodes, query, path, weights) == pytest.approx(cost, rel=1e-9, abs=1e-9)
     for t in range(8):
-        quest.push(asked[t])
-        step_by_step.push(asked[t])
-        so_far = part(query, np.arange(t + 1))
-        assert table.cost(asked[: t + 1], step_by_step.path()) == pytest.approx(search(index, so_far).cost, rel=1e-9, abs=1e-9)
-    path = quest.path()
-    assert table.cost(asked, path) == pytest.approx(path_cost(nodes, query, path, weights), rel=1e-9, abs=1e-9)
-    assert table.cost(asked, path) == pytest.approx(best.cost, rel=1e-9, abs=1e-9)
-    require_the_best_ahead(table, StepBounds(table, bounds), asked, 2)
+        step_by_step.push(targets[t])
+        so_far = query.part(np.arange(t + 1))
+        least, _ = literal(nodes, so_far, weights)
+        assert path_cost(nodes, so_far, step_by_step.path(), weights) == pytest.approx(least, rel=1e-9, abs=1e-9)
+    require_the_best_ahead(index, nodes, targets, 2)
 
 
-def require_the_best_ahead(table, bounds, asked, ahead):
+def require_the_best_ahead(index, nodes, targets, ahead):
     """Every settled node is on a cheapest path from the one before it; all steps of its window are computed."""
-    every = np.arange(len(table))
+    every = np.arange(len(nodes))
     i, j = (grid.ravel() for grid in np.meshgrid(every, every, indexing="ij"))
-    steps = table.steps(i, j).reshape(len(table), -1)
-    targets = np.stack([table.class_targets(q)[table.class_of] for q in asked])
-    targets[[(every != q.node) & (q.node >= 0) for q in asked]] = np.inf
-    quest, path = Search(table, bounds), []
-    for t, query in enumerate(asked):
-        quest.push(query)
+    steps = step_costs(nodes, i, j, index.weights).reshape(len(nodes), -1)
+    quest, path = Search(index), []
+    for t, asked in enumerate(targets):
+        quest.push(asked)
         if t < ahead:
             continue
-        to_come = np.zeros(len(table))
+        to_come = np.zeros(len(nodes))
         for target in targets[t : t - ahead : -1]:
             to_come = (steps + target + to_come).min(axis=1)
         whole = (steps[path[-1]] if path else 0.0) + targets[t - ahead] + to_come
@@ -191,8 +173,8 @@ def test_phone_by_phone_gives_what_the_whole_gives(pair, speeches, look_ahead, f
 def test_the_three_hundredth_phone_costs_what_the_tenth_does(pair, speeches, look_ahead, monkeypatch):
     """Without a pause; counted in steps whose cost is computed, and in phones that are kept."""
     _, runtime = pair
-    computed, steps = [], Nodes.steps
-    monkeypatch.setattr(Nodes, "steps", lambda self, i, j: computed.append(len(i)) or steps(self, i, j))
+    computed = []
+    monkeypatch.setattr(engine, "step_costs", lambda nodes, i, *rest: computed.append(len(i)) or step_costs(nodes, i, *rest))
     spoken = [label for speech in speeches for label in speech.phones.labels if label != "pau"]
     stream, each = runtime.stream(look_ahead=look_ahead), []
     for t in range(300):
@@ -265,7 +247,7 @@ def soft_model(small_corpus):
         model = Efase(components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, sharpening=0.8).fit(
             small_corpus
         )
-    model.audio.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
+    model.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
     return model
 
 

@@ -14,13 +14,16 @@ from safetensors.torch import save_file
 from facesynth.config import load_config
 from facesynth.corpus import node_name
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
+from facesynth.inference.efase.bounds import step_bounds
+from facesynth.inference.efase.costs import all_targets
+from facesynth.inference.efase.search import SearchIndex
+from facesynth.inference.efase.steps import path_cost
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.efase.constraints import read_constraints
 from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.search import build_index, search
 from facesynth.methods.registry import create, load
 
 
@@ -234,19 +237,23 @@ def test_dense_search_on_a_torch_device_finds_the_same_path(model, speech):
     query = model.plan(speech).query
     transitions = transition_matrix(nodes, weights, "cpu", torch.float64)
     assert (query.phones < 0).any()  # silence is a step here
-    dense, sparse = dense_search(nodes, query, weights, transitions), search(model.index(), query)
-    np.testing.assert_allclose(dense.cost, sparse.cost, rtol=1e-9)
+    targets = all_targets(nodes, query, weights)
+    costs = [
+        path_cost(nodes, query, path, weights)
+        for path in (dense_search(targets, transitions), model.speaker.index.cheapest_path(targets))
+    ]
+    np.testing.assert_allclose(costs[0], costs[1], rtol=1e-9)
 
 
 def test_equals_the_literal_algorithm_on_a_recorded_database(model, halves):
     nodes, weights = model.nodes().take(np.arange(90)), model.weights()
-    index = build_index(nodes, weights)
+    index = SearchIndex(nodes, weights, step_bounds(nodes, weights))
     for utterance in list(halves[1])[:3]:
         query = model.plan(utterance.speech).query
         cost, path = literal(nodes, query, weights)
-        found = search(index, query)
-        np.testing.assert_allclose(found.cost, cost, rtol=1e-9)
-        np.testing.assert_array_equal(found.nodes, path)
+        found = index.cheapest_path(all_targets(nodes, query, weights))
+        np.testing.assert_allclose(path_cost(nodes, query, found, weights), cost, rtol=1e-9)
+        np.testing.assert_array_equal(found, path)
 
 
 def test_a_constraint_changes_nothing_beyond_the_next_pause(model, speech):
@@ -312,7 +319,7 @@ def test_model_files_that_are_none(model, tmp_path):
         load(tmp_path / "nothing.safetensors")
 
 
-@pytest.mark.parametrize("spoil", ["config", "node_frames", "nearest", "short"])
+@pytest.mark.parametrize("spoil", ["config", "node_frames", "bounds_in", "short"])
 def test_model_files_with_something_missing(model, tmp_path, spoil):
     path = tmp_path / "m.safetensors"
     model.save(path)

@@ -15,17 +15,18 @@ from facesynth.config import load_config
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
+from facesynth.inference.efase.assembly import Smoothing, concatenate
+from facesynth.inference.efase.hearing import PoseDistances
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.filters import sharpen
-from facesynth.methods.efase.audio import pose_costs, pose_distances, sound_distances
-from facesynth.methods.efase.concatenation import Smoothing, concatenate
-from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error
+from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error, pose_differences
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.learn import descent
 from facesynth.methods.learn import expectation as prediction
 from facesynth.methods.learn.descent import Logs, descend
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.methods.registry import load
+from facesynth.methods.training import train
 
 
 @pytest.fixture(scope="module")
@@ -47,21 +48,21 @@ def speech(halves):
 
 def test_a_recorded_sentence_sounds_like_itself(hearing, halves):
     utterance = next(iter(halves[0]))
-    sounds = hearing.audio.sound.of(utterance.speech)
-    nodes = hearing.audio.sound.nodes.numpy().astype(np.float64)
+    sounds, nodes = hearing.audio.sound.sounds(), hearing.audio.sound.nodes.numpy().astype(np.float64)
+    heard = sounds.of(hearing.audio.sound.hearing.bands(utterance.speech), utterance.speech.phones)
     spoken = [i for i, label in enumerate(utterance.speech.phones.labels) if label != "pau"]
     names = [f"{utterance.id}:{i}" for i in spoken]
-    distances = sound_distances(sounds[spoken], nodes)
+    distances = sounds.distances(heard[spoken])
     places = [hearing.facts["names"].index(name) for name in names]
     np.testing.assert_allclose(distances[np.arange(len(spoken)), places], 0, atol=1e-4)
-    pairs = sound_distances(nodes, nodes)
+    pairs = sounds.distances(nodes)
     assert pairs[~np.eye(len(nodes), dtype=bool)].mean() == pytest.approx(2, rel=0.05)
 
 
 def test_the_audio_term_draws_the_path_to_nodes_that_sound_alike(hearing, speech):
-    query, expected = hearing.asked(speech)
+    query, heard = hearing.asked(speech)
     spoken = query.phones >= 0
-    distances = sound_distances(expected.sounds, hearing.audio.sound.nodes.numpy().astype(np.float64))
+    distances = hearing.audio.sound.sounds().distances(heard.sounds)
 
     def mean_distance(weight):
         nodes = hearing.with_weights(audio_weight=weight, pose_weight=0.0, temperature=0.0).plan(speech).nodes
@@ -74,7 +75,7 @@ def test_the_pose_term_draws_motion_to_what_is_expected(hearing, speech):
     def distance(weight):
         model = hearing.with_weights(pose_weight=weight, audio_weight=0.0, temperature=0.0)
         plan, bounds = model.plan(speech), speech.phones.frame_bounds(120)
-        rest = model.rest_of(speech)
+        rest = np.zeros((len(plan.nodes), plan.expected.shape[1]))
         made = concatenate(model.nodes(), plan.nodes, speech.phones.labels, bounds, rest, 120, Smoothing(stiffness=0))
         spoken = np.repeat(plan.nodes >= 0, np.diff(bounds))
         return ((made - plan.expected)[spoken] ** 2).sum(axis=1).mean()
@@ -86,8 +87,8 @@ def test_the_pose_term_draws_motion_to_what_is_expected(hearing, speech):
 def test_pose_costs_of_all_nodes_are_those_of_stretched_motion(hearing, count):
     nodes, rng = hearing.nodes(), np.random.default_rng(count)
     poses, metric = rng.normal(size=(count, nodes.frames.shape[1])), rng.uniform(0, 2, nodes.frames.shape[1])
-    wanted = pose_distances(nodes, np.arange(len(nodes)), poses) @ metric
-    np.testing.assert_allclose(pose_costs(nodes.frames, nodes.starts, nodes.lengths, poses, metric), wanted, rtol=1e-9)
+    wanted = pose_differences(nodes, np.arange(len(nodes)), poses) @ metric
+    np.testing.assert_allclose(PoseDistances(nodes, metric).of([poses])[0], wanted, rtol=1e-9)
 
 
 def test_silence_follows_what_is_expected_without_a_jump(hearing):
@@ -231,7 +232,7 @@ def _with_others_spoilt(halves, path):
 def test_fitting_learns_from_its_own_corpus_alone_and_keeps_what_it_found(halves, tmp_path):
     settings = {"audio_weight": 0.2, "temperature": 2.0, "candidates": 20}
     wanted = learn(_with_others_spoilt(halves, tmp_path / "spoilt"), settings, seed=4)
-    model = Efase(**settings, learn=True).fit(halves[0], seed=4)
+    model = train(Efase, halves[0], {**settings, "learn": True}, seed=4)
     assert {name: model.config[name] for name in wanted.settings} == wanted.settings
     assert model.facts["learned"]["improvement"] == wanted.improvement
     plain = Efase(**{**settings, **wanted.settings}).fit(halves[0], seed=4)

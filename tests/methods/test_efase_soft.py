@@ -7,30 +7,19 @@ import numpy as np
 import pytest
 import torch
 from corpora import tiny_corpus
-from test_efase_search import literal, random_nodes, random_query
+from literal_search import joint_cost, literal, path_cost, shape_cost, transition_cost
+from test_efase_search import random_nodes, random_query, search
 
+from facesynth.inference.efase.assembly import Smoothing, concatenate
+from facesynth.inference.efase.costs import Query, Weights, all_targets
+from facesynth.inference.efase.soft import Mixture, candidates, soft_search
+from facesynth.inference.efase.steps import step_terms
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import stretched, time_warp
-from facesynth.methods.efase.concatenation import Smoothing, concatenate
-from facesynth.methods.efase.costs import (
-    Query,
-    Weights,
-    joint_cost,
-    path_cost,
-    shape_cost,
-    target_costs,
-    transition_cost,
-)
+from facesynth.methods.efase.learning import tensors
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.search import build_index, search
-from facesynth.methods.efase.soft import Mixture, candidates, soft_search
-from facesynth.methods.efase.steps import CostWeights, step_terms
 from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.registry import load
-
-
-def all_targets(nodes, query, weights):
-    return np.stack([target_costs(nodes, query, t, weights) for t in range(len(query))])
 
 
 def enumerated(nodes, query, extra, weights, temperature, allowed):
@@ -105,10 +94,10 @@ def test_cold_it_finds_the_path_of_the_exact_search_without_being_told():
         for _ in range(5):
             nodes, weights = random_nodes(rng), Weights(pnt)
             query = replace(random_query(rng, nodes, 7), heard=rng.exponential(pnt, (7, len(nodes))))  # no ties
-            exact = search(build_index(nodes, weights), query)
+            _, exact = search(nodes, query, weights)
             targets = all_targets(nodes, query, weights)
             found = soft_search(nodes, query, targets, weights, targets.argmin(axis=1), 1e-7, len(nodes))
-            assert [m.nodes[m.shares.argmax()] for m in found] == list(exact.nodes)
+            assert [m.nodes[m.shares.argmax()] for m in found] == list(exact)
             assert min(m.shares.max() for m in found) > 1 - 1e-9
 
 
@@ -118,8 +107,8 @@ def test_its_free_energy_is_the_sum_over_all_paths_and_falls_to_the_least_cost()
         nodes, weights = random_nodes(rng, 6, sentence=3), Weights(3.0)
         query = replace(random_query(rng, nodes, 4), heard=rng.exponential(3.0, (4, 6)))
         targets = [torch.from_numpy(row) for row in all_targets(nodes, query, weights)]
-        costs = CostWeights(weights.pnt, weights.alpha, weights.beta, weights.eta)
-        steps = [step_terms(nodes, np.arange(6), np.arange(6)).cost(costs)] * 3
+        terms = tensors(step_terms(nodes, np.arange(6), np.arange(6)))
+        steps = [terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta)] * 3
         every = np.array([path_cost(nodes, query, np.array(path), weights) for path in product(range(6), repeat=4)])
         energies = []
         for temperature in (0.01, 0.5, 5.0):
@@ -159,7 +148,7 @@ def test_the_terms_add_up_to_the_transition_cost(shortest):
     weights = Weights(2.0)
     before, after = rng.choice(25, 9, replace=False), rng.choice(25, 12, replace=False)
     terms = step_terms(nodes, before, after)
-    costs = terms.cost(CostWeights(weights.pnt, weights.alpha, weights.beta, weights.eta)).numpy()
+    costs = terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta)
     wanted = [[transition_cost(nodes, int(i), int(j), weights) for j in after] for i in before]
     np.testing.assert_allclose(costs, wanted, rtol=1e-9, atol=1e-9)
     for a, i in enumerate(before):
@@ -204,9 +193,9 @@ def test_the_exact_search_with_an_audio_cost_equals_the_literal_algorithm(fixed)
             query = random_query(rng, nodes, 7, fixed=fixed)
             query = replace(query, heard=rng.exponential(pnt, (7, len(nodes))))
             cost, path = literal(nodes, query, weights)
-            found = search(build_index(nodes, weights), query)
-            np.testing.assert_allclose(found.cost, cost, rtol=1e-9)
-            np.testing.assert_array_equal(found.nodes, path)
+            found, nodes_found = search(nodes, query, weights)
+            np.testing.assert_allclose(found, cost, rtol=1e-9)
+            np.testing.assert_array_equal(nodes_found, path)
 
 
 def test_certain_mixtures_concatenate_like_their_path():

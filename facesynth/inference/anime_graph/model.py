@@ -75,9 +75,10 @@ class AnimeGraph:
         self._sections = butterworth(ORDER, 2 * self._cutoffs[self._filtered] / self.fps)
         self.expectation: Expectation | None = None
         if self.weights.pose > 0:
-            from ..expectation import Bands, Expectation  # only models that expect need it
+            from ..expectation import exported_bands, exported_expectation  # only models that expect need it
 
-            self.expectation, self._bands = Expectation(folder, arrays, threads), Bands(folder, threads)
+            self.expectation = exported_expectation(folder, arrays, threads)
+            self._bands = exported_bands(folder, threads)
         self._plp, self._encode, self._decode = (Graph(folder, name, threads) for name in ("rasta_plp", "encode", "decode"))
 
     @cached_property
@@ -159,7 +160,7 @@ class AnimeGraph:
         """The expected pose over each phone."""
         said, felt = zip(*numbers, strict=True)
         bounds = frame_bounds(ends_s, self.fps)
-        poses = expectation.poses(self._bands.of(speech), said, ends_s, felt, self.fps, int(bounds[-1]))
+        poses = expectation.poses(self._bands(speech), said, ends_s, felt, self.fps, int(bounds[-1]))
         return np.split(poses, bounds[1:-1])
 
     def map_emotion(self, motion: Motion, source: str, target: str, *, intensity: Floats | float = 1.0) -> Motion:

@@ -1,4 +1,4 @@
-"""From chosen nodes to frames: stretching, joining, silence, closed lips (Deng 2008, §6.3)."""
+"""From a path of nodes to frames: stretching, joining, smoothing, and what the face does in silence."""
 
 from __future__ import annotations
 
@@ -6,91 +6,138 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..efase.nodes import Floats, Ints, Nodes
-from ..efase.soft import Mixture
+from ..efase.soft import Mixture, mean_motion
+from ..filters import gaussian
 from ..joints import smooth_joint
 from ..phones import SILENCE
-from ..warp import stretched, time_warp
+from ..warp import time_warp
 
 FIRM = frozenset(["p", "b", "m", "f", "v", "w"])
+"""Phones whose shape must survive the smoothing (Deng 2008, §6.3)."""
 LOOSE = frozenset(["k", "g", "ch", "ng", "r"])
-SETTLE_S, WAKE_S = 0.25, 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The result of a search."""
-
-    nodes: Ints
-    """[P] a node of the folder for each phone; -1 in silence."""
-    cost: float
-    mixtures: Sequence[Mixture | None] = ()
-    """[P] nodes that may stand at each phone, None in silence; empty where only the cheapest path counts."""
-    expected: Floats | None = None
-    """[T, D] pose that the sound leads one to expect; None where nothing predicts it."""
+SETTLE_S = 0.25
+"""How long the face takes to its rest pose."""
+WAKE_S = 0.2
+"""How long before speech it leaves that pose."""
+NEUTRAL = "neutral"
+"""The emotion that weak ones are blended with."""
+SMOOTH_S = 0.08
+"""Standard deviation of what intensities of emotion are smoothed with."""
 
 
 @dataclass(frozen=True)
 class Smoothing:
     """How joints are smoothed."""
 
-    firm: float
-    loose: float
-    reach_s: float
-    stiffness: float
+    firm: float = 2.0
+    loose: float = 0.5
+    reach_s: float = 0.025
+    """Frames on either side of a joint, at least three."""
+    stiffness: float = 1.0
+    """Weight of the bending term at 120 Hz."""
 
 
 def concatenate(
-    nodes: Nodes, plan: Plan, phones: Sequence[str], bounds: Ints, rest: Floats, fps: float, smoothing: Smoothing
+    nodes: Nodes,
+    path: Ints,
+    phones: Sequence[str],
+    bounds: Ints,
+    rest: Floats,
+    fps: float,
+    smoothing: Smoothing,
+    mixtures: Sequence[Mixture | None] | None = None,
+    expected: Floats | None = None,
 ) -> Floats:
-    """Coordinates [T, D]: bounds [P + 1] first frames of the phones, rest [P, D] the rest pose at each."""
+    """Frames [T, D] of one search result.
+
+    path [P] a node for each phone (ignored where it is `pau`), bounds [P + 1] first frames of the
+    phones, rest [P, D] the rest pose at each phone. Where there are mixtures [P], each phone is the mean
+    of its time-warped nodes, and a joint is smoothed as far as it is probably none that was captured. Where
+    a pose is expected of each frame [T, D], silence follows it instead of resting.
+    """
     frames = np.zeros((bounds[-1], nodes.frames.shape[1]))
-    path, mixtures = plan.nodes, plan.mixtures or [None] * len(phones)
     spoken = np.array([phone != SILENCE for phone in phones])
     for t in np.flatnonzero(spoken & (np.diff(bounds) > 0)).tolist():
-        start, stop, mixture = int(bounds[t]), int(bounds[t + 1]), mixtures[t]
+        start, stop = int(bounds[t]), int(bounds[t + 1])
+        mixture = mixtures[t] if mixtures is not None else None
         frames[start:stop] = (
-            np.tensordot(mixture.shares, stretched(nodes, mixture.nodes, stop - start), 1)
-            if mixture
-            else time_warp(nodes.motion(int(path[t])), stop - start)
+            mean_motion(nodes, mixture, stop - start) if mixture else time_warp(nodes.motion(int(path[t])), stop - start)
         )
-    kind = [smoothing.firm if phone in FIRM else smoothing.loose if phone in LOOSE else 1.0 for phone in phones]
-    weights = np.repeat(kind, np.diff(bounds))
-    reach, stiffness = max(3, round(smoothing.reach_s * fps)), smoothing.stiffness * (fps / 120) ** 3
-    for t in range(1, len(path)):
-        mixture = mixtures[t]
-        strength = 1 - mixture.captured if mixture else float(nodes.before[path[t]] != path[t - 1])
-        if not (spoken[t] and spoken[t - 1]) or strength <= 0:
-            continue
-        # The phone that holds the joint's frame: one too short for a frame hands the joint on to the next.
-        holder = int(np.searchsorted(bounds, bounds[t], side="right")) - 1
-        if 0 < holder < len(path):
-            inside = min(reach, int(bounds[holder] - bounds[holder - 1]), int(bounds[holder + 1] - bounds[holder]))
-            if inside > 0:
-                frames = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], ~spoken, [False]]).astype(int)))
-    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if plan.expected is None:
+    frames = _smooth_joints(frames, nodes, path, phones, bounds, fps, smoothing, mixtures)
+    for first, stop in _runs(~spoken):
+        if expected is None:
             _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
         else:
-            _follow(frames, int(bounds[first]), int(bounds[stop]), plan.expected, fps)
+            _follow(frames, int(bounds[first]), int(bounds[stop]), expected, fps)
     return frames
 
 
+def joints(nodes: Nodes, path: Ints, phones: Sequence[str], bounds: Ints) -> Ints:
+    """First frames of phones that were not captured right after the phone before them."""
+    jumps = [
+        bounds[t]
+        for t in range(1, len(path))
+        if phones[t] != SILENCE and phones[t - 1] != SILENCE and nodes.before[path[t]] != path[t - 1]
+    ]
+    return np.array(jumps, np.int64)
+
+
+def _smooth_joints(
+    frames: Floats,
+    nodes: Nodes,
+    path: Ints,
+    phones: Sequence[str],
+    bounds: Ints,
+    fps: float,
+    smoothing: Smoothing,
+    mixtures: Sequence[Mixture | None] | None,
+) -> Floats:
+    weight = {**dict.fromkeys(FIRM, smoothing.firm), **dict.fromkeys(LOOSE, smoothing.loose)}
+    weights = np.repeat([weight.get(phone, 1.0) for phone in phones], np.diff(bounds))
+    reach = max(3, round(smoothing.reach_s * fps))
+    stiffness = smoothing.stiffness * (fps / 120) ** 3
+    for t in range(1, len(path)):
+        strength = _jump(nodes, path, phones, mixtures, t)
+        place = int(np.searchsorted(bounds, bounds[t], side="right")) - 1  # t, or the phone after those without frames
+        if strength <= 0 or place >= len(path):
+            continue
+        inside = min(reach, int(bounds[place] - bounds[place - 1]), int(bounds[place + 1] - bounds[place]))
+        if inside > 0:
+            frames = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
+    return frames
+
+
+def _jump(nodes: Nodes, path: Ints, phones: Sequence[str], mixtures: Sequence[Mixture | None] | None, t: int) -> float:
+    """Probability that phone t was not captured right after the phone before it; 0 beside silence."""
+    if SILENCE in (phones[t - 1], phones[t]):
+        return 0.0
+    mixture = mixtures[t] if mixtures is not None else None
+    return 1 - mixture.captured if mixture else float(nodes.before[path[t]] != path[t - 1])
+
+
+def _runs(silent: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
 def _fill_silence(frames: Floats, start: int, stop: int, rest: Floats, fps: float) -> None:
-    """A short silence is bridged; a long one, or one at an edge, goes through the rest pose."""
+    """Between words a short silence is bridged; a long one, or one at an edge, goes through the rest pose.
+
+    Everything follows 3u² - 2u³, which starts and ends without velocity.
+    """
     settle, wake = round(SETTLE_S * fps), round(WAKE_S * fps)
     at_start, at_end = start == 0, stop == len(frames)
     if stop <= start:
         return
-    before, after = rest if at_start else frames[start - 1], rest if at_end else frames[stop]
+    before = rest if at_start else frames[start - 1]
+    after = rest if at_end else frames[stop]
     count = stop - start
     k = np.arange(1, count + 1)[:, None]
     if at_start or at_end or count > settle + wake:
-        leave = np.zeros((count, 1)) if at_end else _ease((k - (count + 1 - wake)) / wake)
-        arrive = np.ones((count, 1)) if at_start else _ease(k / settle)
+        leave = np.zeros_like(k, float) if at_end else _ease((k - (count + 1 - wake)) / wake)
+        arrive = np.ones_like(k, float) if at_start else _ease(k / settle)
         frames[start:stop] = (1 - leave) * ((1 - arrive) * before + arrive * rest) + leave * after
     else:
         share = _ease(k / (count + 1))
@@ -112,6 +159,15 @@ def _follow(frames: Floats, start: int, stop: int, expected: Floats, fps: float)
         frames[start:stop] += (1 - arrive) * (frames[stop] - expected[stop])
 
 
-def _ease(u: NDArray[np.float64]) -> Floats:
+def _ease(u: Floats) -> Floats:
     u = np.clip(u, 0, 1)
     return u * u * (3 - 2 * u)
+
+
+def blend(neutral: Floats, expressive: Floats, intensity: Floats, bounds: Ints, fps: float) -> Floats:
+    """`x_neutral + I(t) (x_emotion - x_neutral)`, frames [T, C], intensity [P] of each phone, smoothed over time.
+
+    Between neutral and full emotion (named as missing in Deng 2008).
+    """
+    share = gaussian(np.repeat(intensity, np.diff(bounds)), SMOOTH_S * fps)[:, None]
+    return neutral + share * (expressive - neutral)

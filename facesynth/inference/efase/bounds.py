@@ -1,22 +1,90 @@
-"""What phones before and after a position cost at least, for all nodes at once, from tables that came with the database.
+"""What phones before and after a position cost at least, for all nodes at once, from tables that are made once.
 
-A class is the nodes of one phone in one emotion; nodes are sorted so that each class is a range. The least phi of a class
-plus the least cost of a step from that class to a node bounds the node's phi, and the same holds backwards.
+A class is the nodes of one phone in one emotion. Of every node the tables hold the least cost of a step to it from each class
+that says the viseme of its captured predecessor, and the least cost of a step from it to each class; steps that were captured
+(free) and steps from another viseme (PNT at least) are left out. 8 bits on a logarithmic scale, rounded down. The least phi of
+a class plus the least cost of a step from that class to a node bounds the node's phi, and the same holds backwards.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..efase.costs import Weights
 from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.steps import step_terms
 
+TABLES = ("bounds_in", "bounds_out", "bounds_scale")
+"""Names of the tables."""
 NONE = 255
 """In a table: no such step."""
+ROUNDING = 1 - 1e-6
+"""Costs are lowered by this before they are coded, for they come from matrix products."""
+COLUMNS = 256
+"""Nodes to which steps are computed at once."""
+
+
+def class_order(nodes: Nodes) -> Ints:
+    """[N] nodes sorted by viseme, phone and emotion, so that each class is a range; alike ones as they were."""
+    return np.lexsort((np.arange(len(nodes)), nodes.emotions, nodes.phones, nodes.visemes))
+
+
+def class_starts(nodes: Nodes) -> Ints:
+    """[C] first node of each class, of nodes in the order of `class_order`."""
+    change = (np.diff(nodes.phones) != 0) | (np.diff(nodes.emotions) != 0)
+    return np.concatenate([[0], np.flatnonzero(change) + 1]).astype(np.int64)
+
+
+def step_bounds(nodes: Nodes, weights: Weights) -> dict[str, NDArray[Any]]:
+    """The tables of a database, rows and columns in the order of `class_order`.
+
+    bounds_in: for each viseme in turn [its classes, nodes whose predecessor says it], flat; bounds_out [C, N];
+    bounds_scale [2]: lowest value and ratio of neighbouring ones, 0 in a table being 0.
+    """
+    nodes = nodes.take(class_order(nodes))
+    first = class_starts(nodes)
+    of_class = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(nodes))))
+    out = np.full((len(first), len(nodes)), np.inf, np.float32)
+    coming = []
+    preceding = np.where(nodes.before >= 0, nodes.visemes[nodes.before], -1)
+    for viseme in np.unique(nodes.visemes):
+        i, j = np.flatnonzero(nodes.visemes == viseme), np.flatnonzero(preceding == viseme)
+        own = np.unique(of_class[i])
+        table = np.full((len(own), len(j)), np.inf)
+        by_length = np.argsort(nodes.lengths[nodes.before[j]], kind="stable")
+        for some in np.split(by_length, range(COLUMNS, len(j), COLUMNS)) if len(j) else ():
+            cost = _steps(nodes, i, j[some], weights)
+            table[:, some] = np.minimum.reduceat(cost, first[own] - i[0], axis=0)
+            classes = of_class[j[some]]
+            for number in np.unique(classes):
+                out[number, i] = np.minimum(out[number, i], cost[:, classes == number].min(axis=1))
+        coming.append(table.ravel())
+    return dict(zip(TABLES, _coded(np.concatenate(coming), out), strict=True))
+
+
+def _steps(nodes: Nodes, i: Ints, j: Ints, weights: Weights) -> Floats:
+    """[n, m] costs of steps within a viseme; infinite where they were captured."""
+    terms = step_terms(nodes, i, j)
+    return np.where(terms.captured > 0, np.inf, terms.cost(0.0, 0.0, weights.beta, weights.eta))
+
+
+def _coded(coming: Floats, out: NDArray[np.float32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    known = np.concatenate([table[np.isfinite(table) & (table > 0)].ravel() for table in (coming, out)])
+    lowest, highest = (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
+    ratio = max((highest / lowest) ** (1 / (NONE - 3)), 1 + 1e-6)
+
+    def code(table: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+        finite = np.isfinite(table)
+        with np.errstate(divide="ignore"):
+            steps = np.floor(np.log(np.where(finite, table, 1.0) * ROUNDING / lowest) / np.log(ratio))
+        return np.where(finite, np.clip(steps + 1, 0, NONE - 1), NONE).astype(np.uint8)
+
+    return code(coming), code(out), np.array([lowest, ratio])
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,22 +100,21 @@ class Arrivals:
 
 
 class StepBounds:
-    """The tables of `facesynth export`."""
+    """Bounds from tables, over nodes in the order of `class_order`."""
 
-    def __init__(self, nodes: Nodes, arrays: Mapping[str, NDArray[Any]]) -> None:
-        self.nodes = nodes
-        lowest, ratio = arrays["bounds_scale"].tolist()
+    def __init__(self, nodes: Nodes, weights: Weights, tables: Mapping[str, NDArray[Any]]) -> None:
+        self.nodes, self.weights = nodes, weights
+        self.class_starts = class_starts(nodes)
+        self.class_of = np.repeat(np.arange(len(self.class_starts)), np.diff(np.append(self.class_starts, len(nodes))))
+        lowest, ratio = tables["bounds_scale"].tolist()
         self._values = np.concatenate([[0.0], lowest * ratio ** np.arange(NONE - 1), [np.inf]]).astype(np.float32)
-        self._leaving = arrays["bounds_out"]
-        self._arrivals = list(self._tables(arrays["bounds_in"]))
-        self._after = np.full(len(nodes), -1, np.int64)
-        followers = np.flatnonzero(nodes.before >= 0)
-        self._after[nodes.before[followers]] = followers
+        self._leaving = tables["bounds_out"]
+        self._arrivals = list(self._tables(tables["bounds_in"]))
         self._orphans = nodes.before < 0
 
-    def _tables(self, coded: NDArray[np.uint8]) -> Any:
+    def _tables(self, coded: NDArray[np.uint8]) -> Iterator[Arrivals]:
         nodes, at = self.nodes, 0
-        first = nodes.visemes[nodes.class_starts]
+        first = nodes.visemes[self.class_starts]
         preceding = np.where(nodes.before >= 0, nodes.visemes[nodes.before], -1)
         for viseme in np.unique(first).tolist():
             own, reached = np.flatnonzero(first == viseme), np.flatnonzero(preceding == viseme)
@@ -58,7 +125,7 @@ class StepBounds:
 
     def forward(self, phi: Floats) -> Floats:
         """[N] at least min over i of phi(i) + TC(i, j), where phi [N] is a bound itself."""
-        w, by_class = self.nodes.weights, np.minimum.reduceat(phi, self.nodes.class_starts)
+        w, by_class = self.weights, np.minimum.reduceat(phi, self.class_starts)
         least = by_class.min()
         above = (by_class - least).astype(np.float32)
         alike = np.full(len(phi), np.inf, np.float32)
@@ -71,20 +138,19 @@ class StepBounds:
 
     def following(self, i: Ints) -> Ints:
         """The nodes that were recorded right after the nodes i."""
-        after = self._after[i]
+        after = self.nodes.after[i]
         return after[after >= 0]
 
     def backward(self, j: Ints, value: Floats, i: Ints) -> Floats:
         """[n] at least min over the nodes j [m] of TC(i, j) + value(j), for the nodes i [n]."""
-        nodes, w, none = self.nodes, self.nodes.weights, np.inf
-        by_class = np.full(len(nodes.class_starts), none)
-        np.minimum.at(by_class, nodes.class_of[j], value)
+        nodes, w, none = self.nodes, self.weights, np.inf
+        by_class = np.full(len(self.class_starts), none)
+        np.minimum.at(by_class, self.class_of[j], value)
         some = np.flatnonzero(by_class < none)
         least, orphan = value.min(), value[self._orphans[j]].min(initial=none)
         bound = np.full(len(i), min(least + w.pnt, orphan + w.alpha * w.pnt))
         above = (by_class[some] - least).astype(np.float32)
         bound = np.minimum(bound, (self._values[self._leaving[some[:, None], i]] + above[:, None]).min(axis=0) + least)
-        after = self._after[i]
         of = np.full(len(nodes) + 1, none)
         of[j] = value
-        return np.minimum(bound, of[after])
+        return np.minimum(bound, of[nodes.after[i]])

@@ -1,18 +1,31 @@
-"""What is heard has its say in the target cost: how nodes sounded, and how near they are to the pose that is expected."""
+"""What is heard has its say in the target cost: how nodes sounded, and how near they are to the pose that is expected.
+
+Two terms, both 0 in the paper:
+
+* sound: squared distance between the sound of the input's phone and of the node's, log-mel bands at five times over
+  the phone and a little around it, as principal components of unit variance;
+* pose: mean over the phone's frames of ‖expected - node‖², the expected pose from `Expectation`, the node
+  time-warped to the phone.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..efase.nodes import Floats, Ints, Nodes
-from ..expectation import Bands, Expectation, standardised
-from ..folder import Folder
+from ..efase.steps import squared_distances
+from ..expectation import Bands, Expectation, Single, Standard
+from ..phones import PHONES, SILENCE
 from ..products import product
+from ..speech import PhoneTrack, Speech
+
+SPAN = (-0.25, 1.25)
+"""From where to where the sound of a phone is taken, in parts of its duration."""
+PLACES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,53 +34,41 @@ class Heard:
 
     costs: Floats
     """[P, N] of every node at every phone."""
+    sounds: Floats | None
+    """[P, A] sound of each phone; None where it does not count."""
     poses: Floats | None
     """[T, D] expected pose of each frame; None where nothing predicts it."""
 
 
-class Hearing:
-    """Both terms, as far as the model has them."""
-
-    def __init__(self, folder: Folder, arrays: Mapping[str, NDArray[Any]], nodes: Nodes, threads: int) -> None:
-        settings = folder.settings
-        self.nodes, self.settings = nodes, settings
-        self.bands = Bands(folder, threads)
-        self.sounds = PhoneSounds(arrays, settings) if settings["sound_weight"] > 0 else None
-        self.expectation = Expectation(folder, arrays, threads) if settings["pose_weight"] > 0 else None
-        self.distances = PoseDistances(nodes, arrays["pose_metric"]) if self.expectation else None
-
-    def hear(self, speech: Any, said: Sequence[int], felt: Sequence[int], spoken: NDArray[np.bool_], bounds: Ints) -> Heard:
-        """said and felt [P] numbers of phones and emotions, spoken [P], bounds [P + 1] first frames."""
-        ends_s = np.asarray(speech.phones.ends_s, np.float64)
-        bands, fps = self.bands.of(speech), float(self.settings["database_fps"])
-        costs, poses = np.zeros((len(said), len(self.nodes))), None
-        if self.sounds is not None:
-            costs[spoken] += self.settings["sound_weight"] * self.sounds.distances(bands, ends_s)[spoken]
-        if self.expectation is not None and self.distances is not None:
-            poses = self.expectation.poses(bands, said, ends_s, felt, fps, int(bounds[-1]))
-            asked = np.flatnonzero(spoken & (np.diff(bounds) > 0))
-            pieces = [poses[bounds[t] : bounds[t + 1]] for t in asked]
-            costs[asked] += self.settings["pose_weight"] * self.distances.of(pieces)
-        return Heard(costs, poses)
-
-
+@dataclass(frozen=True, eq=False)
 class PhoneSounds:
-    """How the database's phones sounded."""
+    """How the database's phones sounded, as vectors whose squared distance is 2 on average between two nodes."""
 
-    def __init__(self, arrays: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> None:
-        self.nodes = arrays["sound_nodes"].astype(np.float64)
-        self.settings, self.arrays = settings, arrays
+    nodes: NDArray[np.floating]
+    """[N, A] of every node."""
+    centre: Single
+    """[200]"""
+    basis: Single
+    """[200, A]"""
+    size: Single
+    """[A] what each component is divided by."""
+    standard: Standard
 
-    def distances(self, bands: NDArray[np.float32], ends_s: Floats) -> Floats:
-        """[P, N] squared distance of how each phone sounds to how each node did."""
-        starts, a = np.concatenate([[0.0], ends_s[:-1]]), self.arrays
-        first, last = self.settings["sound_span"]
-        places = np.linspace(first, last, self.settings["sound_places"])
-        times_s = starts[:, None] + places * (ends_s - starts)[:, None]
-        spans = standardised(bands, times_s, a["sound_mean"], a["sound_deviation"]).reshape(len(ends_s), -1)
-        sounds = (((spans - a["sound_centre"]) @ a["sound_basis"]) / a["sound_size"]).astype(np.float64)
-        squared = np.square(sounds).sum(axis=1)[:, None] + np.square(self.nodes).sum(axis=1)
-        return np.maximum(squared - 2 * product(sounds, self.nodes.T), 0.0)
+    def of(self, bands: Single, phones: PhoneTrack) -> Floats:
+        """[P, A] the sound of each phone of a speech with these bands [F, 40]."""
+        spans = phone_spans(bands, phones, self.standard)
+        return (((spans - self.centre) @ self.basis) / self.size).astype(np.float64)
+
+    def distances(self, sounds: Floats) -> Floats:
+        """[P, N] squared distance of sounds [P, A] to those of the nodes."""
+        return squared_distances(sounds, self.nodes.astype(np.float64))
+
+
+def phone_spans(bands: Single, phones: PhoneTrack, standard: Standard) -> Single:
+    """[P, PLACES * 40] standardised bands over each phone and a little around it."""
+    places = np.linspace(*SPAN, PLACES)
+    times_s = phones.starts_s[:, None] + places * (phones.ends_s - phones.starts_s)[:, None]
+    return standard.at(bands, times_s).reshape(len(phones), -1)
 
 
 # A node of l frames x, stretched to the L frames of a phone, is W x with W [L, l] of two neighbouring entries a row. The mean
@@ -76,12 +77,13 @@ class PhoneSounds:
 class PoseDistances:
     """Weighted squared distance of all nodes to expected poses."""
 
-    def __init__(self, nodes: Nodes, metric: NDArray[np.float32]) -> None:
+    def __init__(self, nodes: Nodes, metric: NDArray[np.floating]) -> None:
+        """metric [D]: how much a squared difference of each coordinate counts."""
         self.nodes, self.metric = nodes, metric.astype(np.float64)
-        weighted = nodes.frames * metric.astype(np.float32)
-        self._own = np.einsum("fd,fd->f", weighted, nodes.frames, dtype=np.float64)
+        weighted = nodes.frames * self.metric
+        self._own = np.einsum("fd,fd->f", weighted, nodes.frames)
         self._next = np.zeros(len(nodes.frames))
-        self._next[:-1] = np.einsum("fd,fd->f", weighted[:-1], nodes.frames[1:], dtype=np.float64)
+        self._next[:-1] = np.einsum("fd,fd->f", weighted[:-1], nodes.frames[1:])
         self._by_length = [np.flatnonzero(nodes.lengths == length) for length in np.unique(nodes.lengths)]
 
     def of(self, pieces: Sequence[Floats]) -> Floats:
@@ -110,3 +112,31 @@ def stretching(length: int, count: int) -> Floats:
     matrix[rows, np.minimum(low + 1, length - 1)] += at - low
     matrix[rows, low] += 1 - (at - low)
     return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Hearing:
+    """Both terms, as far as a model has them."""
+
+    bands: Bands
+    sounds: PhoneSounds | None
+    sound_weight: float
+    expectation: Expectation | None
+    distances: PoseDistances | None
+    """There with the expectation."""
+    pose_weight: float
+
+    def hear(self, speech: Speech, felt: Ints, count: int, fps: float) -> Heard:
+        """felt [P] numbers of the emotions, count nodes, fps of the database."""
+        labels, bounds, bands = speech.phones.labels, speech.phones.frame_bounds(fps), self.bands(speech)
+        spoken = np.array([label != SILENCE for label in labels])
+        costs, sounds, poses = np.zeros((len(labels), count)), None, None
+        if self.sounds is not None:
+            sounds = self.sounds.of(bands, speech.phones)
+            costs[spoken] += self.sound_weight * self.sounds.distances(sounds[spoken])
+        if self.expectation is not None and self.distances is not None:
+            said = [PHONES.index(label) for label in labels]
+            poses = self.expectation.poses(bands, said, speech.phones.ends_s, felt.tolist(), fps, int(bounds[-1]))
+            asked = np.flatnonzero(spoken & (np.diff(bounds) > 0))
+            costs[asked] += self.pose_weight * self.distances.of([poses[bounds[t] : bounds[t + 1]] for t in asked])
+        return Heard(costs, sounds, poses)

@@ -2,79 +2,99 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..closures import close_lips
-from ..efase.assembly import Plan, Smoothing, concatenate
-from ..efase.bounds import StepBounds
-from ..efase.nodes import Floats, Ints, Nodes, Query, Weights
-from ..efase.search import Search
-from ..efase.soft import Mixture, Softness, mixtures
+from ..efase.assembly import NEUTRAL, Smoothing, blend, concatenate, joints
+from ..efase.costs import Query, Weights
+from ..efase.explanation import explain, shares
+from ..efase.hearing import Heard, Hearing
+from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.plan import Plan, plan_speech
+from ..efase.search import Engine, SearchIndex, Stretch
+from ..efase.soft import Mixture, soft_search
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
-from ..filters import at_rate, gaussian, sharpen
-from ..folder import Folder
-from ..graphs import Graph
+from ..filters import at_rate, sharpen
 from ..layout import Layout
 from ..lips import gap, has_lips
 from ..motion import Motion
-from ..phones import SILENCE
-from ..speech import frame_bounds
+from ..phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
+from ..speech import Speech, frame_bounds
 
-if TYPE_CHECKING:
-    from ..efase.hearing import Heard, Hearing
-
-BILABIALS = frozenset(["p", "b", "m"])
-LIP_PHONES = BILABIALS | {"f", "v"}
-NEUTRAL = "neutral"
-SMOOTH_S = 0.08
+LIP_PHONES = BILABIALS | LABIODENTALS
+"""Never said by another viseme class while their own has a node: everybody sees lips that do not close."""
 OPTIONS = ("seed", "fps", "constraints", "look_ahead")
 
 
+@dataclass(frozen=True)
+class Settings:
+    """How speech is made from the nodes."""
+
+    database_fps: float
+    """Rate of the nodes, Hz."""
+    smoothing: Smoothing
+    bridge_pauses: bool = False
+    """Whether silence is a step of the search; see `plan`."""
+    temperature: float = 0.0
+    """0: the cheapest path; above, in units of the cost, the mean over paths; see `soft`."""
+    candidates: int = 150
+    """Nodes of each phone that such a mean is taken over."""
+    sharpening: float = 0.0
+    """How much quick movement is raised."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What a trained model consists of."""
+
+    layout: Layout
+    fps: float
+    """Of the recordings, Hz."""
+    emotions: tuple[str, ...]
+    nodes: Nodes
+    names: Sequence[str]
+    """[N] utterance of each node and number of the phone in it."""
+    rest: Floats
+    """[E, D] rest pose in each emotion."""
+    weights: Weights
+    bounds: Mapping[str, NDArray[Any]]
+    """Tables of `step_bounds`."""
+    settings: Settings
+    decode: Callable[[NDArray[np.float32]], NDArray[np.float32]]
+    """PCA coordinates [T, D] to frames [T, C]."""
+    hearing: Hearing | None = None
+    engine: Engine | None = None
+    """What searches whole stretches; numpy unless another is given."""
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+    """Of the folder that the model came from, if it came from one."""
+
+
 class Efase:
-    """A folder exported from an `efase` model."""
+    """Constrained dynamic programming over captured motion nodes (Deng & Neumann 2008), trained."""
 
-    def __init__(self, folder: Folder, threads: int) -> None:
-        manifest, settings, arrays = folder.manifest, folder.settings, folder.arrays()
-        self.manifest, self.settings, self.fps = manifest, settings, float(manifest["fps"])
-        self.layout, self.emotions = Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"])
-        self.database_fps = float(settings["database_fps"])
-        self.phones = {phone: (index, viseme) for index, (phone, viseme) in enumerate(manifest["phones"])}
-        self.nodes = Nodes.of(arrays, Weights(**settings["weights_of_cost"]))
-        self.smoothing = Smoothing(**settings["smoothing"])
-        self.rest = arrays["rest"].astype(np.float64)
-        self.bounds = StepBounds(self.nodes, arrays)
-        self._captured = set(self.nodes.visemes.tolist())
-        self._names = arrays["names"].tobytes()
-        self._known: dict[str, int] | None = None
-        self._decode = Graph(folder, "decode", threads)
-        soft = settings["temperature"] > 0
-        self.softness = Softness(settings["temperature"], settings["candidates"]) if soft else None
-        self.hearing: Hearing | None = None
-        if settings["sound_weight"] > 0 or settings["pose_weight"] > 0:
-            from ..efase.hearing import Hearing  # only models that hear need it
-
-            self.hearing = Hearing(folder, arrays, self.nodes, threads)
+    def __init__(self, parts: Parts) -> None:
+        self.parts, self.manifest, self.settings = parts, parts.manifest, parts.settings
+        self.layout, self.fps, self.emotions = parts.layout, parts.fps, parts.emotions
+        self.nodes, self.names, self.weights = parts.nodes, parts.names, parts.weights
+        self.hearing, self.database_fps = parts.hearing, parts.settings.database_fps
+        self._captured = set(parts.nodes.visemes.tolist())
         self._gaps: dict[int, float] = {}
 
-    @property
-    def names(self) -> list[str]:
-        """[N] of the nodes: utterance and number of the phone in it."""
-        return self._names.decode().split("\n")
-
-    @property
-    def has_lips(self) -> bool:
-        """Whether the gap between the lips can be read off the layout's points."""
-        return has_lips(self.layout)
+    @cached_property
+    def index(self) -> SearchIndex:
+        """What the numpy search prepares."""
+        return SearchIndex(self.nodes, self.weights, self.parts.bounds)
 
     def synthesize(
         self,
-        speech: Any,
+        speech: Speech,
         *,
         seed: int = 0,
         fps: float | None = None,
@@ -86,56 +106,64 @@ class Efase:
 
         constraints: phone index -> node name. look_ahead: settle each phone when that many more are known, as a stream
         does, in place of the whole search.
+
+        One after the other, at the database's rate: what is heard and expected (`hearing`); the cheapest path of each
+        stretch of speech (`search`) and, above temperature 0, the mean over paths around it (`soft`); nodes stretched to
+        their phones, joints smoothed, silence filled (`assembly`); `sharpen`; PCA decoded; the neutral rendering blended in
+        where an emotion is weak; lips closed at p, b, m (`closures`); then the motion is resampled to `fps`.
         """
         reject_options("efase", options, OPTIONS)
-        if look_ahead is not None:
-            self._require_steps()
         new_fps = self.fps if fps is None else float(fps)
         if not (np.isfinite(new_fps) and new_fps > 0):
             raise FacesynthError(f"fps is {fps}; wanted a positive rate in Hz, or None for the model's {self.fps:g}")
-        labels, ends_s = tuple(speech.phones.labels), np.asarray(speech.phones.ends_s, np.float64)
+        labels, ends_s = speech.phones.labels, speech.phones.ends_s
         feelings, intensity = speech.emotions.per_phone(speech.phones)
-        weak = bool((intensity < 1).any()) and NEUTRAL in self.emotions
         plans = [self.plan(speech, constraints=constraints, look_ahead=look_ahead)]
-        if weak:
+        if bool((intensity < 1).any()) and NEUTRAL in self.emotions:
             plans.append(self.plan(speech, emotion=NEUTRAL, constraints=constraints, look_ahead=look_ahead))
         frames = self.frames(plans, labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
         return Motion(self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1])), new_fps, self.layout)
 
     def plan(
         self,
-        speech: Any,
+        speech: Speech,
         *,
         emotion: str | None = None,
         constraints: Mapping[int, str] | None = None,
         look_ahead: int | None = None,
     ) -> Plan:
-        """Search each stretch of speech between silences, or all of it where the model bridges pauses."""
-        labels = tuple(speech.phones.labels)
+        """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
+        query, heard = self.asked(speech, emotion, constraints)
+        engine, soften = self.parts.engine or self.index.cheapest_path, self._soften if self.settings.temperature > 0 else None
+        if look_ahead is not None:
+            self._require_steps()
+            engine = _looking_ahead(self.index, look_ahead)
+        plan = plan_speech(self.nodes, query, self.weights, engine, soften, bridge_pauses=self.settings.bridge_pauses)
+        return plan if heard is None else replace(plan, expected=heard.poses)
+
+    def asked(
+        self, speech: Speech, emotion: str | None = None, constraints: Mapping[int, str] | None = None
+    ) -> tuple[Query, Heard | None]:
+        """What the search is asked for, what is heard included, and what that is."""
+        labels = speech.phones.labels
         feelings = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
-        fixed = {t: self._node_index(t, name, labels) for t, name in (constraints or {}).items()}
-        queries = [
-            self.query(label, feeling, fixed.get(t, -1)) for t, (label, feeling) in enumerate(zip(labels, feelings, strict=True))
+        query = self.query(labels, feelings, {t: self._node_index(t, name, labels) for t, name in (constraints or {}).items()})
+        if self.hearing is None:
+            return query, None
+        heard = self.hearing.hear(speech, query.emotions, len(self.nodes), self.database_fps)
+        return replace(query, heard=heard.costs), heard
+
+    def query(self, labels: Sequence[str], feelings: Sequence[str], fixed: Mapping[int, int] | None = None) -> Query:
+        """What phones in these emotions ask for; fixed: position -> node."""
+        visemes, fixed = np.array([viseme_of(label) for label in labels]), fixed or {}
+        silent = np.array([label == SILENCE for label in labels])
+        strict = [
+            label in LIP_PHONES and viseme in self._captured and t not in fixed
+            for t, (label, viseme) in enumerate(zip(labels, visemes.tolist(), strict=True))
         ]
-        heard = self._heard(self.hearing, speech, queries) if self.hearing else None
-        if heard is not None:
-            queries = [replace(query, heard=costs) for query, costs in zip(queries, heard.costs, strict=True)]
-        mixed: list[Mixture | None] = [None] * len(labels)
-        nodes, cost, stretch = np.full(len(labels), -1, np.int64), 0.0, Stretch(self, look_ahead)
-        whole = self.settings["bridge_pauses"]
-        for t, query in enumerate(queries):
-            if query.phone >= 0 or whole:
-                stretch.push(query)
-            if t + 1 == len(queries) or (queries[t + 1].phone < 0 and not whole):
-                path = stretch.finish()
-                if len(path):
-                    own = slice(t + 1 - len(path), t + 1)
-                    nodes[own] = path
-                    cost += self.nodes.cost(queries[own], path)
-                    if self.softness:
-                        mixed[own] = mixtures(self.nodes, queries[own], path, self.softness)
-                stretch = Stretch(self, look_ahead)
-        return Plan(nodes, cost, mixed if self.softness else (), heard.poses if heard else None)
+        phones = np.array([PHONES.index(label) for label in labels])
+        felt = np.array([self._emotion_index(feeling) for feeling in feelings])
+        return Query(np.where(silent, -1, phones), np.where(silent, -1, visemes), felt, fixed, np.array(strict))
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one. Without `look_ahead`, a stretch is searched as a whole and settled by the silence after it.
@@ -145,29 +173,30 @@ class Efase:
         self._require_steps()
         return EfaseStream(self, look_ahead, weakened, self.fps if fps is None else fps)
 
-    def query(self, label: str, emotion: str, node: int = -1) -> Query:
-        """What one phone asks for."""
-        if label not in self.phones:
-            raise unknown("phone", label, self.phones)
-        if emotion not in self.emotions:
-            raise unknown("emotion", emotion, self.emotions)
-        feeling = self.emotions.index(emotion)
-        if label == SILENCE:
-            return Query(-1, -1, feeling, node)
-        index, viseme = self.phones[label]
-        return Query(index, viseme, feeling, node, label in LIP_PHONES and viseme in self._captured and node < 0)
+    def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
+        """Chosen node, cost terms and runners-up for each phone."""
+        plan = self.plan(speech, constraints=constraints)
+        return explain(self.nodes, self.names, self.emotions, plan.query, plan.nodes, self.weights)
+
+    def report(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> dict[str, float]:
+        """Shares of phones said by another phone, viseme class or emotion."""
+        plan = self.plan(speech, constraints=constraints)
+        return shares(self.nodes, plan.query, plan.nodes)
+
+    def joins(self, speech: Speech) -> Ints:
+        """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
+        labels, bounds = speech.phones.labels, speech.phones.frame_bounds(self.fps)
+        return joints(self.nodes, self.plan(speech).nodes, labels, bounds)
 
     def frames(
         self, plans: Sequence[Plan], labels: Sequence[str], feelings: Sequence[str], intensity: Floats, bounds: Ints
     ) -> Floats:
         """[T, C] at the database's rate; two plans are one in the emotions and one in neutral, mixed by intensity [P]."""
-        moods: list[Sequence[str]] = [feelings, [NEUTRAL] * len(labels)]
-        made = [self._decoded(plan, labels, mood, bounds) for plan, mood in zip(plans, moods, strict=False)]
-        frames = made[0]
-        if len(made) > 1:
-            share = gaussian(np.repeat(intensity, np.diff(bounds)), SMOOTH_S * self.database_fps)[:, None]
-            frames = made[1] + share * (made[0] - made[1])
-        if self.has_lips:
+        frames = self._decoded(plans[0], labels, feelings, bounds)
+        if len(plans) > 1:
+            neutral = self._decoded(plans[1], labels, [NEUTRAL] * len(labels), bounds)
+            frames = blend(neutral, frames, intensity, bounds, self.database_fps)
+        if has_lips(self.layout):
             wanted = np.max([self._closures(plan, labels) for plan in plans], axis=0)
             frames = close_lips(frames, wanted, self.layout, bounds, self.database_fps)
         return frames.astype(np.float32).astype(np.float64)
@@ -182,27 +211,30 @@ class Efase:
                 made = np.clip(made, frames.min(axis=0), frames.max(axis=0))
         return made[np.minimum(np.arange(count), len(made) - 1)].astype(np.float32)
 
-    def _require_steps(self) -> None:
-        """A mean over paths, and a pose that is expected, look at the whole of what is said."""
-        if self.softness or self.hearing or self.settings["sharpening"] > 0:
-            raise FacesynthError(
-                "this model takes means over paths or hears: it wants whole utterances; for streams and look_ahead export one "
-                "trained with temperature=0 audio_weight=0 pose_weight=0 sharpening=0"
-            )
-
-    def _heard(self, hearing: Hearing, speech: Any, queries: Sequence[Query]) -> Heard:
-        said = [self.phones[label][0] for label in speech.phones.labels]
-        spoken = np.array([label != SILENCE for label in speech.phones.labels])
-        bounds = frame_bounds(np.asarray(speech.phones.ends_s, np.float64), self.database_fps)
-        return hearing.hear(speech, said, [query.emotion for query in queries], spoken, bounds)
+    def coordinates(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
+        """[T, D] PCA coordinates of a plan, silence at rest in each phone's feeling, not yet sharpened."""
+        rest = self.parts.rest[[self._emotion_index(feeling) for feeling in feelings]]
+        fps, smoothing = self.database_fps, self.settings.smoothing
+        return concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
 
     def _decoded(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
-        rest = self.rest[[self.emotions.index(feeling) for feeling in feelings]]
-        coordinates = concatenate(self.nodes, plan, labels, bounds, rest, self.database_fps, self.smoothing)
-        return self._frames_of(sharpen(coordinates, self.settings["sharpening"], self.database_fps))
+        coordinates = self.coordinates(plan, labels, feelings, bounds)
+        return self._frames_of(sharpen(coordinates, self.settings.sharpening, self.database_fps))
 
     def _frames_of(self, coordinates: Floats) -> Floats:
-        return self._decode(coordinates=coordinates.astype(np.float32)[None])[0][0].astype(np.float64)
+        return self.parts.decode(coordinates.astype(np.float32)).astype(np.float64)
+
+    def _soften(self, query: Query, targets: Floats, path: Ints) -> list[Mixture]:
+        temperature, limit = self.settings.temperature, self.settings.candidates
+        return soft_search(self.nodes, query, targets, self.weights, path, temperature, limit)
+
+    def _require_steps(self) -> None:
+        """A mean over paths, and a pose that is expected, look at the whole of what is said."""
+        if self.settings.temperature > 0 or self.hearing or self.settings.sharpening > 0:
+            raise FacesynthError(
+                "this model takes means over paths or hears: it wants whole utterances; for streams and look_ahead take one "
+                "trained with temperature=0 audio_weight=0 pose_weight=0 sharpening=0"
+            )
 
     def _closures(self, plan: Plan, labels: Sequence[str]) -> Floats:
         """[P] smallest lip gap of the node at each p, b, m as it was captured (the mean of a mixture's); NaN elsewhere."""
@@ -223,43 +255,30 @@ class Efase:
             self._gaps |= {node: float(part.min()) for node, part in zip(new, parts, strict=True)}
         return [self._gaps[node] for node in which]
 
+    def _emotion_index(self, emotion: str) -> int:
+        if emotion not in self.emotions:
+            raise unknown("emotion", emotion, self.emotions)
+        return self.emotions.index(emotion)
+
     def _node_index(self, t: int, name: str, labels: Sequence[str]) -> int:
         if not 0 <= t < len(labels):
             raise FacesynthError(f"there is no phone {t} to constrain; the input has phones 0 to {len(labels) - 1}")
         if labels[t] == SILENCE:
             raise FacesynthError(f"phone {t} is silence, which has no node; constrain a phone that is spoken")
-        if self._known is None:
-            self._known = {known: n for n, known in enumerate(self.names)}
-        if name not in self._known:
-            raise unknown("node", name, self._known)
-        return self._known[name]
+        if name not in self._numbers:
+            raise unknown("node", name, self._numbers)
+        return self._numbers[name]
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {name: number for number, name in enumerate(self.names)}
 
 
-class Stretch:
-    """A run of phones that is searched as one; with a look-ahead, nodes are settled as it goes.
+def _looking_ahead(index: SearchIndex, look_ahead: int) -> Engine:
+    def path(targets: Floats) -> Ints:
+        stretch = Stretch(index, look_ahead)
+        for target in targets:
+            stretch.push(target)
+        return stretch.finish()
 
-    With a look-ahead of n, the phone n before the newest one is settled on the best path that goes on from the node settled
-    before it. Nothing older is looked at again.
-    """
-
-    def __init__(self, model: Efase, look_ahead: int | None) -> None:
-        if look_ahead is not None and look_ahead < 1:
-            raise FacesynthError(f"look_ahead is {look_ahead}; wanted at least 1 phone, or None for the whole search")
-        self.search, self.look_ahead = Search(model.nodes, model.bounds), look_ahead
-        self.settled: list[int] = []
-        self.pushed = 0
-
-    def push(self, query: Query) -> None:
-        """The next phone."""
-        self.search.push(query)
-        self.pushed += 1
-        if self.look_ahead is not None and self.pushed > self.look_ahead:
-            self.settled.append(int(self.search.trace(self.look_ahead + 1)[0]))
-            self.search.settle(self.settled[-1], self.look_ahead)
-
-    def finish(self) -> Ints:
-        """[P] a node for each phone."""
-        if not self.pushed:
-            return np.zeros(0, np.int64)
-        rest = self.search.trace(self.pushed - len(self.settled))
-        return np.concatenate([np.array(self.settled, np.int64), rest])
+    return path

@@ -17,14 +17,19 @@ in batches.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.bounds import StepBounds
-from ..efase.nodes import Floats, Ints, Nodes, Query
+from ..efase.bounds import StepBounds, class_order
+from ..efase.costs import Weights
+from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.steps import end_vectors, start_vectors, step_costs
+from ..errors import FacesynthError
 from ..products import product
 
 BEAM = 32
@@ -42,14 +47,34 @@ MANY = 300
 UNKNOWN, START = -2, -1
 """In place of a predecessor."""
 
+Engine = Callable[[Floats], Ints]
+"""Whatever finds the cheapest path: target costs [T, N] to a node for each phone [T]; ties go to the lowest node."""
+
+
+class SearchIndex:
+    """What can be prepared before the input is known: nodes sorted by class, and bounds; its size grows with N."""
+
+    def __init__(self, nodes: Nodes, weights: Weights, tables: Mapping[str, NDArray[Any]]) -> None:
+        """tables: those of `step_bounds` for these nodes and weights."""
+        self.order = class_order(nodes)
+        self.place = np.argsort(self.order)
+        self.nodes, self.weights = nodes.take(self.order), weights
+        self.bounds = StepBounds(self.nodes, weights, tables)
+
+    def cheapest_path(self, targets: Floats) -> Ints:
+        """[T] the nodes of the path of least COST, by target costs [T, N]; an `Engine`."""
+        search = Search(self)
+        for target in targets:
+            search.push(target)
+        return search.path()
+
 
 @dataclass(eq=False)
 class Position:
     """What is known at one phone."""
 
-    query: Query
     targets: Floats
-    """[C] target cost of the nodes of each class, what is heard left out."""
+    """[N] target cost of each node."""
     phi: Floats
     """[N] exact where `back` is known, elsewhere a lower bound."""
     back: NDArray[np.int32]
@@ -73,27 +98,22 @@ class Kept:
 class Search:
     """`push` phones; `path` is the best so far."""
 
-    def __init__(self, nodes: Nodes, bounds: StepBounds) -> None:
-        self.nodes, self.bounds = nodes, bounds
+    def __init__(self, index: SearchIndex) -> None:
+        self.index, self.nodes, self.bounds, self.weights = index, index.nodes, index.bounds, index.weights
         self.positions: list[Position] = []
 
     def __len__(self) -> int:
         return len(self.positions)
 
-    def push(self, query: Query) -> None:
-        """The next phone."""
-        nodes = self.nodes
-        targets, back = nodes.class_targets(query), np.full(len(nodes), UNKNOWN, np.int32)
-        phi = targets[nodes.class_of]
-        if query.heard is not None:
-            phi += query.heard
-        if query.node >= 0:
-            phi = np.where(np.arange(len(nodes)) == query.node, phi, np.inf)
+    def push(self, targets: Floats) -> None:
+        """The next phone, by the target cost [N] of every node."""
+        targets, back = targets[self.index.order], np.full(len(self.nodes), UNKNOWN, np.int32)
+        phi = targets
         if self.positions:
-            phi += self.bounds.forward(self.positions[-1].phi)
+            phi = targets + self.bounds.forward(self.positions[-1].phi)
         else:
             back[:] = START
-        here = Position(query, targets, phi, back)
+        here = Position(targets, phi, back)
         here.beam, here.upper = self._beam(here)
         self.positions.append(here)
 
@@ -109,12 +129,12 @@ class Search:
         for position in self.positions[: -count - 1 : -1]:
             found.append(node)
             node = int(position.back[node])
-        return np.array(found[::-1], np.int64)
+        return self.index.order[np.array(found[::-1], np.int64)]
 
     def _first_of_least(self, cost: Floats, which: Ints) -> int:
         """Of the nodes `which` [n] that of least cost [n]; of those, the one of the lowest number."""
         tied = which[cost == cost.min()]
-        return int(tied[self.nodes.numbers[tied].argmin()])
+        return int(tied[self.index.order[tied].argmin()])
 
     def settle(self, node: int, ahead: int) -> None:
         """From now on all paths go through `node`, of the last path `trace`, `ahead` phones before the newest one.
@@ -123,7 +143,7 @@ class Search:
         what is exact stays so where its path goes through the node.
         """
         del self.positions[: -ahead - 1]
-        first = self.positions[0]
+        first, node = self.positions[0], int(self.index.place[node])
         cost = float(first.phi[node])
         first.phi, first.back = np.full(len(self.nodes), np.inf), np.full(len(self.nodes), UNKNOWN, np.int32)
         first.phi[node], first.back[node] = 0.0, START
@@ -137,11 +157,6 @@ class Search:
         newest.beam = known[np.argsort(newest.phi[known], kind="stable")[:BEAM]]
         newest.upper = newest.phi[newest.beam]
 
-    def _target(self, position: Position, which: Ints) -> Floats:
-        """[n] target cost of the nodes `which`."""
-        cost: Floats = position.targets[self.nodes.class_of[which]]
-        return cost if position.query.heard is None else cost + position.query.heard[which]
-
     def _beam(self, here: Position) -> tuple[Ints, Floats]:
         """Real paths to nodes of small bounds and to those that were recorded after the last beam."""
         phi, wide = here.phi, min(BEAM, len(here.phi))
@@ -151,7 +166,7 @@ class Search:
         last = self.positions[-1]
         chosen = np.union1d(chosen, self.bounds.following(last.beam))
         chosen = chosen[phi[chosen] < np.inf]
-        upper = self._reached(last.beam, last.upper, chosen) + self._target(here, chosen)
+        upper = self._reached(last.beam, last.upper, chosen) + here.targets[chosen]
         best = np.argsort(upper, kind="stable")[:BEAM]
         return chosen[best], upper[best]
 
@@ -161,7 +176,7 @@ class Search:
         costs = phi + self._joints(i, j)
         wide = min(TRIED, len(i))
         tried = np.argpartition(costs, wide - 1, axis=1)[:, :wide]
-        steps = nodes.steps(i[tried].ravel(), np.repeat(j, wide)).reshape(tried.shape)
+        steps = step_costs(nodes, i[tried].ravel(), np.repeat(j, wide), self.weights).reshape(tried.shape)
         best = (phi[tried] + steps).min(axis=1)
         place = np.full(len(nodes) + 1, -1)
         place[i] = np.arange(len(i))
@@ -171,10 +186,10 @@ class Search:
     def _joints(self, i: Ints, j: Ints) -> Floats:
         """[m, n] cost of the joint from each i to each j, rounded down, and of another viseme class."""
         nodes = self.nodes
-        ends, joints = nodes.ends(i), nodes.joints(j)
+        ends, joints = end_vectors(nodes, i, self.weights), start_vectors(nodes, j, self.weights)
         total = np.square(joints).sum(axis=1)[:, None] + np.square(ends).sum(axis=1)
         cost = np.maximum(total * (1 - ROUNDING) - 2 * product(joints, ends.T), 0.0)
-        cost += np.where(nodes.visemes[nodes.before[j]][:, None] == nodes.visemes[i], 0.0, nodes.weights.pnt)
+        cost += np.where(nodes.visemes[nodes.before[j]][:, None] == nodes.visemes[i], 0.0, self.weights.pnt)
         return cost
 
     def _solve(self) -> None:
@@ -194,7 +209,7 @@ class Search:
             whole = position.phi[some.nodes] + some.rest
             j = some.nodes[np.argsort(whole, kind="stable")[: 2 * BEAM]]
             j = np.union1d(j, np.intersect1d(self.bounds.following(i), some.nodes))
-            phi = self._reached(i, phi, j) + self._target(position, j)
+            phi = self._reached(i, phi, j) + position.targets[j]
             best = np.argsort(phi, kind="stable")[: 2 * BEAM]
             i, phi = j[best], phi[best]
         return phi
@@ -208,7 +223,7 @@ class Search:
             j = found[-1].nodes[found[-1].unknown]
             if not len(j):
                 break
-            value = found[-1].rest[found[-1].unknown] + self._target(after, j)
+            value = found[-1].rest[found[-1].unknown] + after.targets[j]
             i = np.flatnonzero(position.phi <= limit - value.min())
             rest = self.bounds.backward(j, value, i)
             left = position.phi[i] + rest <= limit
@@ -223,7 +238,7 @@ class Search:
         if not len(j) or not len(i):
             here.phi[j] = np.maximum(here.phi[j], limit - rest)
             return
-        target = self._target(here, j)
+        target = here.targets[j]
         best, origin = self._cheapest(i, last.phi[i], j, limit - rest - target)
         phi, exact = best + target, best + target + rest <= limit
         here.phi[j] = np.where(exact, phi, np.maximum(here.phi[j], limit - rest))
@@ -237,7 +252,7 @@ class Search:
         before = place[captured]
         best, origin = np.where(before >= 0, phi[before], np.inf), captured.copy()
         orphan = captured < 0
-        best[orphan], origin[orphan] = phi.min() + nodes.weights.alpha * nodes.weights.pnt, self._first_of_least(phi, i)
+        best[orphan], origin[orphan] = phi.min() + self.weights.alpha * self.weights.pnt, self._first_of_least(phi, i)
         lowest = phi + self._joints(i, j)
         lowest[orphan] = np.inf
         lowest[np.flatnonzero(before >= 0), before[before >= 0]] = np.inf
@@ -255,9 +270,9 @@ class Search:
 
     def _try(self, row: Ints, column: Ints, lowest: Floats, i: Ints, phi: Floats, j: Ints, best: Floats, origin: Ints) -> None:
         """Compute the pairs (i[column], j[row]) exactly, and take them off `lowest`."""
-        numbers, usable = self.nodes.numbers, lowest[row, column] < np.inf
+        numbers, usable = self.index.order, lowest[row, column] < np.inf
         row, column = row[usable], column[usable]
-        cost = phi[column] + self.nodes.steps(i[column], j[row])
+        cost = phi[column] + step_costs(self.nodes, i[column], j[row], self.weights)
         lowest[row, column] = np.inf
         order = np.lexsort((numbers[i[column]], cost, row))
         row, column, cost = row[order], column[order], cost[order]
@@ -271,3 +286,33 @@ def _limit(upper: Floats) -> float:
     """The least of upper bounds, with a margin."""
     least = float(upper.min())
     return least + MARGIN * max(abs(least), 1e-3)
+
+
+class Stretch:
+    """A run of phones that is searched as one; with a look-ahead, nodes are settled as it goes.
+
+    With a look-ahead of n, the phone n before the newest one is settled on the best path that goes on from the node settled
+    before it. Nothing older is looked at again.
+    """
+
+    def __init__(self, index: SearchIndex, look_ahead: int | None) -> None:
+        if look_ahead is not None and look_ahead < 1:
+            raise FacesynthError(f"look_ahead is {look_ahead}; wanted at least 1 phone, or None for the whole search")
+        self.search, self.look_ahead = Search(index), look_ahead
+        self.settled: list[int] = []
+        self.pushed = 0
+
+    def push(self, targets: Floats) -> None:
+        """The next phone, by the target cost [N] of every node."""
+        self.search.push(targets)
+        self.pushed += 1
+        if self.look_ahead is not None and self.pushed > self.look_ahead:
+            self.settled.append(int(self.search.trace(self.look_ahead + 1)[0]))
+            self.search.settle(self.settled[-1], self.look_ahead)
+
+    def finish(self) -> Ints:
+        """[P] a node for each phone."""
+        if not self.pushed:
+            return np.zeros(0, np.int64)
+        rest = self.search.trace(self.pushed - len(self.settled))
+        return np.concatenate([np.array(self.settled, np.int64), rest])

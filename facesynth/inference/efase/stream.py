@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.assembly import SETTLE_S, WAKE_S, Plan
+from ..efase.assembly import NEUTRAL, SETTLE_S, WAKE_S
+from ..efase.costs import target_costs
 from ..efase.nodes import Ints
+from ..efase.plan import Plan
+from ..efase.search import Stretch
 from ..errors import FacesynthError
 from ..filters import at_rate
 from ..phones import SILENCE
@@ -30,25 +33,22 @@ class EfaseStream:
     """
 
     def __init__(self, model: Efase, look_ahead: int | None, weakened: bool, fps: float) -> None:
-        from ..efase.model import NEUTRAL, Stretch
-
         self.model, self.fps, self.look_ahead = model, fps, look_ahead
-        self.plans = 2 if weakened and NEUTRAL in model.emotions else 1
-        self.weakened = weakened
+        self.weakened, self.plans = weakened, 2 if weakened and NEUTRAL in model.emotions else 1
         self.labels: list[str] = []
         self.ends_s: list[float] = []
         self.feelings: list[str] = []
         self.intensity: list[float] = []
         self.paths: list[list[int]] = [[] for _ in range(self.plans)]
         self.frames_out = 0
-        self._neutral = NEUTRAL
-        self._stretches = [Stretch(model, look_ahead) for _ in range(self.plans)]
+        self._stretches = [Stretch(model.index, look_ahead) for _ in range(self.plans)]
 
     def push(self, phone: str, end_s: float, emotion: str, intensity: float = 1.0) -> NDArray[np.float32]:
         """The next phone, to its end in seconds; the frames that became final, possibly none."""
         self._check(end_s, intensity)
-        queries = [self.model.query(phone, feeling) for feeling in (emotion, self._neutral)[: self.plans]]
-        silent = phone == SILENCE and not self.model.settings["bridge_pauses"]
+        model, moods = self.model, (emotion, NEUTRAL)[: self.plans]
+        queries = [model.query([phone], [mood]) for mood in moods]
+        silent = phone == SILENCE and not model.settings.bridge_pauses
         if silent:
             self._end_stretch()
         self.labels.append(phone)
@@ -60,7 +60,7 @@ class EfaseStream:
                 path.append(-1)
                 continue
             before = len(stretch.settled)
-            stretch.push(query)
+            stretch.push(target_costs(model.nodes, query, 0, model.weights))
             path.extend(stretch.settled[before:])
         return self._emit(last=False)
 
@@ -83,7 +83,7 @@ class EfaseStream:
     def _end_stretch(self) -> None:
         for path, stretch in zip(self.paths, self._stretches, strict=True):
             path.extend(stretch.finish()[len(stretch.settled) :].tolist())
-        self._stretches = [type(stretch)(self.model, self.look_ahead) for stretch in self._stretches]
+        self._stretches = [Stretch(self.model.index, self.look_ahead) for _ in range(self.plans)]
 
     def _emit(self, *, last: bool) -> NDArray[np.float32]:
         known = min(len(path) for path in self.paths)
@@ -120,8 +120,9 @@ class EfaseStream:
         oldest = (start / self.fps - HISTORY_S) * model.database_fps
         first = max(0, int(np.searchsorted(bounds, oldest, side="right")) - 1)
         zero = int(bounds[first])
-        plans = [Plan(np.array(path[first:known], np.int64), 0.0) for path in self.paths]
         own = slice(first, known)
+        query = model.query(self.labels[own], self.feelings[own])
+        plans = [Plan(query, np.array(path[own], np.int64), 0.0) for path in self.paths]
         frames = model.frames(plans, self.labels[own], self.feelings[own], np.array(self.intensity[own]), bounds[first:] - zero)
         if self.fps == model.database_fps:
             return frames[np.minimum(np.arange(start, stop) - zero, len(frames) - 1)].astype(np.float32)

@@ -374,7 +374,10 @@ class AnimeGraph(Method):
         bounds, felt = speech.phones.frame_bounds(self.fps), np.array([self.emotions.index(e) for e in feelings])
         poses: list[NDArray[np.float64] | None] = [None] * len(felt)
         if self.predictor is not None:
-            poses = list(np.split(self.predictor.at(speech, felt, len(self.emotions), self.fps, int(bounds[-1])), bounds[1:-1]))
+            said = [PHONES.index(label) for label in speech.phones.labels]
+            bands, expectation = self.predictor.hearing.bands(speech), self.predictor.expectation(len(self.emotions))
+            found = expectation.poses(bands, said, speech.phones.ends_s, felt.tolist(), self.fps, int(bounds[-1]))
+            poses = list(np.split(found, bounds[1:-1]))
         lengths = np.diff(bounds).tolist()
         return [
             Wish(PHONE_INDEX[label], int(emotion), features[a:b], length, pose)

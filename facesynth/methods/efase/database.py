@@ -9,10 +9,10 @@ import numpy as np
 import torch
 
 from facesynth.corpus import Corpus, Utterance, node_name
+from facesynth.inference.efase.nodes import Floats, Nodes
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, SILENCE, viseme_of
-from facesynth.methods.efase.nodes import Floats, MotionNodes
 from facesynth.motion.pca import Pca
 from facesynth.motion.resample import resample
 from facesynth.progress import track
@@ -23,7 +23,7 @@ class Database:
     """What eFASE learns."""
 
     pca: Pca
-    nodes: MotionNodes
+    nodes: Nodes
     names: tuple[str, ...]
     """[N] `utterance_id:phone_number`."""
     rest: Floats
@@ -95,7 +95,7 @@ class _Collector:
         if not self.pieces:
             raise FacesynthError("no phone of this corpus has complete motion; run `facesynth corpus check` on it")
         index = {emotion: i for i, emotion in enumerate(self.corpus.emotions)}
-        nodes = MotionNodes.from_pieces(
+        nodes = Nodes.from_pieces(
             self.pieces,
             np.array([PHONES.index(p) for p in self.phones]),
             np.array([viseme_of(p) for p in self.phones]),
@@ -121,7 +121,7 @@ class _Collector:
         self.names.append(name)
         self.before.append(before)
 
-    def _rest(self, nodes: MotionNodes) -> Floats:
+    def _rest(self, nodes: Nodes) -> Floats:
         """Mean pose of silence; an emotion without any rests as all of them do, or as the mean frame."""
         everything = [piece for pieces in self.silence.values() for piece in pieces]
         fallback = np.concatenate(everything).mean(axis=0) if everything else nodes.frames.mean(axis=0)

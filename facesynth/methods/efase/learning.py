@@ -8,8 +8,8 @@ much the mean must be sharpened to move as quickly as they do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -18,16 +18,15 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.efase.costs import Query, all_targets
+from facesynth.inference.efase.nodes import Floats, Ints, Nodes
+from facesynth.inference.efase.plan import stretches
+from facesynth.inference.efase.soft import candidates
+from facesynth.inference.efase.steps import StepTerms, step_terms
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import stretched
-from facesynth.methods.efase.audio import pose_distances
-from facesynth.methods.efase.costs import Query, target_costs
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.nodes import Floats, Ints
 from facesynth.methods.efase.penalty import median_transition
-from facesynth.methods.efase.plan import part, stretches
-from facesynth.methods.efase.soft import candidates
-from facesynth.methods.efase.steps import CostWeights, StepTerms, step_terms
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.learn.sharpening import matching_share
@@ -43,6 +42,11 @@ class LearnedMetrics(Learned):
 
     sound_metric: tuple[float, ...]
     pose_metric: tuple[float, ...]
+
+    @property
+    def account(self) -> dict[str, Any]:
+        """What a trained model remembers of it, and the metrics that it is to use."""
+        return super().account | {"sound_metric": list(self.sound_metric), "pose_metric": list(self.pose_metric)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +88,7 @@ def logs_of(model: Efase) -> Logs:
     return Logs(numbers, {"sound": sound, "pose": pose})
 
 
-def learn(corpus: Corpus, settings: dict[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> LearnedMetrics:
+def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> LearnedMetrics:
     """Learn on sentences that the database does not have; `pull` weighs the way from the start against the relative error.
 
     `settings` are those of `Efase`, with a temperature above 0. A sharpening above 0 is learned as well.
@@ -106,24 +110,25 @@ def lattices_of(model: Efase, utterance: Utterance) -> list[Lattice]:
     """The stretches of one recorded utterance, candidates chosen by the model's own weights."""
     speech, fps = utterance.speech, model.config["database_fps"]
     frames = resample(utterance.motion, fps).frames
-    query, expected = model.asked(speech)
+    query, heard = model.asked(speech)
+    nodes, weights = model.nodes(), model.weights()
     bounds = speech.phones.frame_bounds(fps)
     truth = with_gaps(model.pca.encode(torch.from_numpy(frames)).double(), int(bounds[-1]))
     made = []
     for places in stretches(query.phones):
-        asked = part(query, places)
-        targets = np.stack([target_costs(model.nodes(), asked, t, model.weights()) for t in range(len(asked))])
+        asked = query.part(places)
+        targets = all_targets(nodes, asked, weights)
         cheapest = targets.argmin(axis=1)
-        chosen = candidates(model.nodes(), asked, targets, model.weights(), cheapest, model.config["candidates"])
+        chosen = candidates(nodes, asked, targets, weights, cheapest, model.config["candidates"])
         ranges = [slice(int(bounds[p]), int(bounds[p + 1])) for p in places]
-        sounds = [None if expected.sounds is None else expected.sounds[p] for p in places]
-        poses = [None if expected.poses is None else expected.poses[r] for r in ranges]
+        sounds = [None if heard is None or heard.sounds is None else heard.sounds[p] for p in places]
+        poses = [None if heard is None or heard.poses is None else heard.poses[r] for r in ranges]
         rows = zip(chosen, sounds, poses, np.diff(bounds)[places].tolist(), strict=True)
         recorded = truth[bounds[places[0]] : bounds[places[-1] + 1]]
         made.append(
             Lattice(
                 [_place(model, asked, t, *row) for t, row in enumerate(rows)],
-                [step_terms(model.nodes(), i, j) for i, j in pairwise(chosen)],
+                [tensors(step_terms(nodes, i, j)) for i, j in pairwise(chosen)],
                 recorded,
             )
         )
@@ -133,10 +138,10 @@ def lattices_of(model: Efase, utterance: Utterance) -> list[Lattice]:
 def mean_error(lattices: Sequence[Lattice], logs: Logs) -> Tensor:
     """Mean over frames of ‖posterior mean - truth‖², differentiable."""
     total, count, values = torch.zeros((), dtype=torch.float64), 0, logs.values()
-    weights = CostWeights(*(values[name] for name in ("pnt", "alpha", "beta", "eta")))
+    weights = {name: values[name] for name in ("pnt", "alpha", "beta", "eta")}
     for lattice in lattices:
         targets = [_target(place, values, logs.factor("sound"), logs.factor("pose")) for place in lattice.places]
-        found = posterior(targets, [step.cost(weights) for step in lattice.steps], values["temperature"])
+        found = posterior(targets, [step.cost(**weights) for step in lattice.steps], values["temperature"])
         means = [torch.tensordot(shares, p.motion, 1) for p, shares in zip(lattice.places, found.nodes, strict=True)]
         error, frames = squared_error(torch.cat(means), lattice.truth)
         total, count = total + error, count + frames
@@ -159,10 +164,20 @@ def _place(model: Efase, query: Query, t: int, chosen: Ints, sound: Floats | Non
         heard = (model.audio.sound.nodes.numpy()[chosen] - sound) ** 2
     fit = np.zeros((len(chosen), 0))
     if poses is not None:
-        fit = pose_distances(nodes, chosen, poses) if count else np.zeros((len(chosen), poses.shape[1]))
+        fit = pose_differences(nodes, chosen, poses) if count else np.zeros((len(chosen), poses.shape[1]))
     motion = stretched(nodes, chosen, count) if count else np.zeros((len(chosen), 0, nodes.frames.shape[1]))
     arrays = (other & ~alike, other & alike, feeling, heard, fit, motion)
     return Place(*(torch.from_numpy(np.asarray(array, np.float64)) for array in arrays))
+
+
+def tensors(terms: StepTerms) -> StepTerms:
+    """The same terms, in which gradients can be taken."""
+    return StepTerms(*(torch.from_numpy(np.ascontiguousarray(getattr(terms, f.name))) for f in fields(terms)))
+
+
+def pose_differences(nodes: Nodes, which: Ints, poses: Floats) -> Floats:
+    """[n, D] for each coordinate the mean over the frames of poses [L, D] of (pose - node)², of the nodes `which`."""
+    return np.asarray(((stretched(nodes, which, len(poses)) - poses) ** 2).mean(axis=1))
 
 
 def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetrics:
@@ -178,7 +193,7 @@ def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetr
 def _sharpening(model: Efase, learned: LearnedMetrics, held_out: Corpus) -> float:
     """What the model needs, as it has been learned, to move as quickly as the recordings of sentences it does not know."""
     model = model.with_weights(**learned.settings, sharpening=0.0)
-    model.audio.count_by(learned.sound_metric, learned.pose_metric)
+    model.count_by(learned.sound_metric, learned.pose_metric)
     fps = model.config["database_fps"]
     pairs = [(model.synthesize(u.speech, fps=fps), resample(u.motion, fps)) for u in track(held_out, "sharpening", len(held_out))]
     return matching_share(pairs)

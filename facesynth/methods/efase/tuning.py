@@ -23,10 +23,9 @@ from scipy.optimize import differential_evolution
 from tqdm import tqdm
 
 from facesynth.corpus import Corpus, Record, Utterance
+from facesynth.inference.efase.nodes import Floats
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.efase.concatenation import concatenate
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.efase.nodes import Floats
 from facesynth.motion.resample import resample
 
 RANGES: dict[str, tuple[float, float]] = {
@@ -152,16 +151,13 @@ def examples_of(model: Efase, corpus: Corpus) -> list[Example]:
 
 def mean_error(model: Efase, examples: Iterable[Example]) -> float:
     """Mean over sentences of eq. 13 of Deng 2008, in PCA space, where squared distances are those over markers."""
-    nodes, fps = model.nodes(), model.config["database_fps"]
-    points = len(model.fitted_layout.names)
+    speaker, points = model.speaker, len(model.fitted_layout.names)
     errors = []
     for example in examples:
         speech = example.utterance.speech
-        plan, bounds = model.plan(speech), speech.phones.frame_bounds(fps)
-        rest = model.rest_of(speech)
-        made = concatenate(
-            nodes, plan.nodes, speech.phones.labels, bounds, rest, fps, model.smoothing, plan.mixtures, plan.expected
-        )
+        feelings, _ = speech.emotions.per_phone(speech.phones)
+        bounds = speech.phones.frame_bounds(speaker.database_fps)
+        made = speaker.coordinates(speaker.plan(speech), speech.phones.labels, feelings, bounds)
         count = min(len(made), len(example.truth))
         errors.append(np.nanmean(((made[:count] - example.truth[:count]) ** 2).sum(axis=1)) / points)
     return float(np.mean(errors))

@@ -10,19 +10,15 @@ from collections.abc import Callable
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.expectation import Expectation, Single, heard
 from facesynth.inference.phones import PHONES
-from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import complete
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
 from facesynth.motion.resample import resample
-
-PHONE_SIZE = 2.0
-"""How loud a phone is beside the standardised bands of the sound."""
 
 
 class PosePredictor(nn.Module):
@@ -56,25 +52,28 @@ class PosePredictor(nn.Module):
         self.eval()
 
     @torch.no_grad()
-    def at(self, speech: Speech, emotions: NDArray[np.int64], emotion_count: int, fps: float, count: int) -> NDArray[np.float64]:
-        """[count, D] coordinates at `fps`; emotions [P] the index of each phone's emotion."""
-        times_s = np.arange(int(np.ceil(count / fps * RATE)) + 2) / RATE
-        heard = self._heard(speech, emotions, emotion_count, times_s)
-        predicted = (self.network(heard.T[None])[0].T * self.scale).cpu().numpy().astype(np.float64)
-        return np.asarray(CubicSpline(times_s, predicted, axis=0)(np.arange(count) / fps))
+    def forward(self, told: Tensor) -> Tensor:
+        """[F, 40 + phones + emotions] what the network is told to coordinates [F, D]."""
+        predicted: Tensor = self.network(told.T[None])[0].T * self.scale
+        return predicted
 
-    def _heard(self, speech: Speech, emotions: NDArray[np.int64], emotion_count: int, times_s: NDArray[np.float64]) -> Tensor:
-        phones = speech.phones
-        number = np.minimum(np.searchsorted(phones.ends_s, times_s, side="right"), len(phones) - 1)
-        said = np.array([PHONES.index(label) for label in phones.labels])[number]
-        bands = self.hearing.at(speech, times_s)
-        labels = torch.from_numpy(np.hstack([PHONE_SIZE * np.eye(len(PHONES))[said], np.eye(emotion_count)[emotions[number]]]))
-        return torch.cat([bands, labels.to(bands)], dim=1)
+    def expectation(self, emotion_count: int) -> Expectation:
+        """What a search takes of it."""
+
+        def predict(told: Single) -> Single:
+            found: Single = self(torch.from_numpy(told).to(self.scale.device)).cpu().numpy()
+            return found
+
+        return Expectation(predict, self.hearing.standard(), emotion_count)
 
     def _tracks(self, utterance: Utterance, emotions: tuple[str, ...], encode: Callable[[Tensor], Tensor]) -> Tracks:
         speech, motion = utterance.speech, resample(utterance.motion, RATE)
-        felt = np.array([emotions.index(e) for e in speech.emotions.per_phone(speech.phones)[0]])
-        heard = self._heard(speech, felt, len(emotions), np.arange(len(motion)) / RATE)
+        said = [PHONES.index(label) for label in speech.phones.labels]
+        felt = [emotions.index(e) for e in speech.emotions.per_phone(speech.phones)[0]]
+        bands, times_s = self.hearing.bands(speech), np.arange(len(motion)) / RATE
+        told: NDArray[np.float32] = heard(
+            bands, said, speech.phones.ends_s, felt, times_s, self.hearing.standard(), len(emotions)
+        )
         present = torch.from_numpy(complete(motion.frames))
         moved = encode(torch.from_numpy(np.nan_to_num(motion.frames))).float()
-        return Tracks(heard, moved * present[:, None], present.float())
+        return Tracks(torch.from_numpy(told), moved * present[:, None], present.float())

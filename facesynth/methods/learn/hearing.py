@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus
+from facesynth.inference.expectation import Standard
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
-from facesynth.speech.mel import LogMel, sample_at
+from facesynth.speech.mel import LogMel
 
 
 class Hearing(nn.Module):
@@ -31,19 +32,25 @@ class Hearing(nn.Module):
 
     def learn(self, corpus: Corpus) -> None:
         """Take mean and deviation of each band from all sounds of a corpus."""
-        count, total, squares = 0, torch.zeros(self.mel.bands).double(), torch.zeros(self.mel.bands).double()
+        count, total, squares = 0, np.zeros(self.mel.bands), np.zeros(self.mel.bands)
         for utterance in corpus:
-            bands = self._bands(utterance.speech).double().cpu()
-            count, total, squares = count + len(bands), total + bands.sum(0), squares + bands.square().sum(0)
-        mean = total / count
-        self.mean = mean.float()
-        self.deviation = (squares / count - mean.square()).clamp(min=1e-4).sqrt().float()
+            bands = self.bands(utterance.speech).astype(np.float64)
+            count, total, squares = count + len(bands), total + bands.sum(axis=0), squares + np.square(bands).sum(axis=0)
+        mean = torch.from_numpy(total / count)
+        self.mean = mean.float().to(self.mean.device)
+        self.deviation = (torch.from_numpy(squares / count) - mean.square()).clamp(min=1e-4).sqrt().float().to(self.mean.device)
 
-    def at(self, speech: Speech, times_s: NDArray[Any]) -> Tensor:
+    def at(self, speech: Speech, times_s: NDArray[np.float64]) -> Tensor:
         """Standardised bands [..., 40] at times [...] (s); times outside the sound get its first or last frame."""
-        return (sample_at(self._bands(speech), self.mel.fps, times_s) - self.mean) / self.deviation
+        return torch.from_numpy(self.standard().at(self.bands(speech), times_s)).to(self.mean.device)
+
+    def standard(self) -> Standard:
+        """Mean and deviation as arrays."""
+        return Standard(self.mean.cpu().numpy(), self.deviation.cpu().numpy())
 
     @torch.no_grad()
-    def _bands(self, speech: Speech) -> Tensor:
+    def bands(self, speech: Speech) -> NDArray[np.float32]:
+        """[F, 40] of a speech, not standardised."""
         audio = resample(speech.audio, speech.sample_rate, self.mel.sample_rate)
-        return self.mel(torch.from_numpy(np.ascontiguousarray(audio)).to(self.mel.window.device))
+        heard: NDArray[Any] = self.mel(torch.from_numpy(np.ascontiguousarray(audio)).to(self.mel.window.device)).cpu().numpy()
+        return heard

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.methods.efase.costs import Query
-from facesynth.methods.efase.nodes import Floats, Ints
-from facesynth.methods.efase.search import Path
-from facesynth.methods.efase.soft import Mixture
+from ..efase.costs import Query, Weights, all_targets
+from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.search import Engine
+from ..efase.soft import Mixture
+from ..efase.steps import path_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,37 +34,28 @@ class Plan:
     """[T, D] pose that the sound leads one to expect of each frame; None where nothing predicts it."""
 
 
+Soften = Callable[[Query, Floats, Ints], Sequence[Mixture]]
+"""Query, target costs [T, N] and cheapest path [T] to what stands beside that path."""
+
+
 def plan_speech(
-    query: Query,
-    search: Callable[[Query], Path],
-    soften: Callable[[Query, Path], Sequence[Mixture]] | None = None,
-    *,
-    bridge_pauses: bool,
+    nodes: Nodes, query: Query, weights: Weights, engine: Engine, soften: Soften | None = None, *, bridge_pauses: bool
 ) -> Plan:
-    """Search each stretch of the query, or all of it at once; `soften` finds what stands beside a cheapest path."""
-    nodes = np.full(len(query), -1, np.int64)
+    """Search each stretch of the query, or all of it at once."""
+    found = np.full(len(query), -1, np.int64)
     mixtures: list[Mixture | None] = [None] * len(query)
     cost = 0.0
     for places in [np.arange(len(query))] if bridge_pauses else stretches(query.phones):
-        asked = part(query, places)
-        path = search(asked)
-        nodes[places] = path.nodes
-        cost += path.cost
+        asked = query.part(places)
+        targets = all_targets(nodes, asked, weights)
+        found[places] = path = engine(targets)
+        cost += path_cost(nodes, asked, path, weights)
         if soften is not None:
-            mixtures[places[0] : places[-1] + 1] = soften(asked, path)
-    return Plan(query, nodes, cost, None if soften is None else tuple(mixtures))
+            mixtures[places[0] : places[-1] + 1] = soften(asked, targets, path)
+    return Plan(query, found, cost, None if soften is None else tuple(mixtures))
 
 
 def stretches(phones: Ints) -> list[Ints]:
     """Positions of each run of phones that are not silence (-1)."""
     spoken = np.flatnonzero(phones >= 0)
     return [run for run in np.split(spoken, np.flatnonzero(np.diff(spoken) > 1) + 1) if len(run)]
-
-
-def part(query: Query, places: Ints) -> Query:
-    """The query at consecutive positions."""
-    first = int(places[0])
-    fixed = {t - first: node for t, node in query.fixed.items() if first <= t <= places[-1]}
-    strict = None if query.strict is None else query.strict[places]
-    heard = None if query.heard is None else query.heard[places]
-    return Query(query.phones[places], query.visemes[places], query.emotions[places], fixed, strict, heard)
