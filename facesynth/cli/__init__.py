@@ -17,6 +17,7 @@ VERBS = {
     "corpus": ("facesynth.cli.corpus:corpus_group", "Make, fill and check a performer's recordings."),
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
+    "retarget": ("facesynth.cli.retarget:retarget", "Put motion on any head, from a few frames posed by hand."),
     "emotion": ("facesynth.cli.emotion:emotion", "Hear the emotion in a voice."),
     "tune": ("facesynth.cli.tune:tune", "Search a method's settings on held-out sentences."),
     "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),

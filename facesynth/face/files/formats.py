@@ -23,10 +23,15 @@ def write_animation(path: str | Path, animation: FaceAnimation, head: Head, moti
     which is ARKit's; `.glb` the head with its shapes; `.npz` all arrays, with the motion beside them; `.bvh` the head's
     movement. The same animation gives the same bytes. A file appears whole or not at all.
     """
-    path = Path(path)
-    if path.suffix.lower() not in WRITERS:
-        raise unknown("animation file type", path.suffix or str(path), SUFFIXES)
-    WRITERS[path.suffix.lower()](path, animation, head, motion)
+    WRITERS[require_suffix(path)](Path(path), animation, head, motion)
+
+
+def require_suffix(path: str | Path) -> str:
+    """The suffix in lower case; FacesynthError where no animation is written so."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in WRITERS:
+        raise unknown("animation file type", suffix or str(path), SUFFIXES)
+    return suffix
 
 
 def require_arkit(animation: FaceAnimation, path: str | Path) -> None:

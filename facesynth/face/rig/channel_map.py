@@ -39,17 +39,18 @@ class ChannelMap:
     channels: tuple[Channel, ...]
 
     @classmethod
-    def of(cls, names: Sequence[str], given: Mapping[str, Channel] | None = None) -> ChannelMap:
+    def of(cls, names: Sequence[str], given: Mapping[str, Channel] | None = None, *, needs_arkit: bool = True) -> ChannelMap:
         """The given channels, and for the others what their names mean where those are ARKit's.
 
-        FacesynthError where a given channel does not exist, or where nothing at all follows ARKit's weights.
+        FacesynthError where a given channel does not exist, or where nothing at all follows ARKit's weights although
+        something has to (`needs_arkit`).
         """
         given = given or {}
         for name in given:
             if name not in names:
                 raise unknown("channel of the mapping", name, names)
         found = tuple(given.get(name) or _by_name(name) for name in names)
-        if not any(channel.shares for channel in found):
+        if needs_arkit and not any(channel.shares for channel in found):
             raise FacesynthError(
                 f"none of the channels {list(names[:4])} … has an ARKit name such as jawOpen; give a mapping file (--mapping)"
             )

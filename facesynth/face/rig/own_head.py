@@ -88,23 +88,24 @@ class OwnHead:
         return vertices.astype(np.float32)
 
 
-def load_own_head(path: str | Path, mapping: str | Path | None = None) -> OwnHead:
+def load_own_head(path: str | Path, mapping: str | Path | None = None, *, needs_arkit: bool = True) -> OwnHead:
     """A head from a .glb or .gltf file, or from a folder of OBJ files: the neutral one and one for each shape.
 
     The mapping is that of the file given, else `NAME.yaml` beside `NAME.glb`, else the channels' names are ARKit's.
+    needs_arkit: whether some channel must follow ARKit's weights; not so where values come in the head's own channels.
     """
     path = Path(path)
     beside = path.with_suffix(".yaml")
     found = Path(mapping) if mapping is not None else beside if beside.is_file() else None
     told = read_mapping(found) if found is not None else HeadMapping({})
     if path.is_dir():
-        return _from_obj(path, told)
+        return _from_obj(path, told, needs_arkit)
     if path.suffix.lower() not in SUFFIXES:
         raise FacesynthError(f"{path} is no head: wanted .glb, .gltf, or a folder of OBJ files")
-    return _from_scene(path, read_scene(path, TEXELS), told)
+    return _from_scene(path, read_scene(path, TEXELS), told, needs_arkit)
 
 
-def _from_scene(path: Path, scene: Scene, told: HeadMapping) -> OwnHead:
+def _from_scene(path: Path, scene: Scene, told: HeadMapping, needs_arkit: bool) -> OwnHead:
     names = tuple(dict.fromkeys(name for part in scene.parts for name in part.targets))
     vertices = np.concatenate([part.vertices for part in scene.parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in scene.parts)])
@@ -112,7 +113,7 @@ def _from_scene(path: Path, scene: Scene, told: HeadMapping) -> OwnHead:
     for part, start in zip(scene.parts, starts[:-1], strict=True):
         for name, moved in part.targets.items():
             shapes[names.index(name), start : start + len(moved)] = moved
-    channel_map = ChannelMap.of(names, told.channels)
+    channel_map = ChannelMap.of(names, told.channels, needs_arkit=needs_arkit)
     node = _head_node(scene, told)
     weight = np.ones(len(vertices))
     if node is not None:
@@ -130,11 +131,11 @@ def _from_scene(path: Path, scene: Scene, told: HeadMapping) -> OwnHead:
     return _placed(path, arrays, channel_map, told, M_PER_UNIT_MM, pivot, [ball for ball, _ in balls], node, eye_nodes)
 
 
-def _from_obj(folder: Path, told: HeadMapping) -> OwnHead:
+def _from_obj(folder: Path, told: HeadMapping, needs_arkit: bool) -> OwnHead:
     names, neutral, moved, triangles = read_shapes(folder)
     colours = np.full((len(triangles), TEXELS, TEXELS, 3), 0.45)
     arrays = (neutral, moved.astype(np.float32), triangles, colours, np.ones(len(neutral)))
-    return _placed(folder, arrays, ChannelMap.of(names, told.channels), told, None, None, [], None, ())
+    return _placed(folder, arrays, ChannelMap.of(names, told.channels, needs_arkit=needs_arkit), told, None, None, [], None, ())
 
 
 def _placed(
@@ -174,8 +175,8 @@ def _placed(
 
 
 def _face_box(path: Path, vertices: NDArray, shapes: NDArray, channel_map: ChannelMap) -> tuple[NDArray, NDArray]:
-    used = [i for i, channel in enumerate(channel_map.channels) if channel.shares]
-    reach = np.linalg.norm(shapes[used], axis=2).max(axis=0)
+    used = [i for i, channel in enumerate(channel_map.channels) if channel.shares] or slice(None)
+    reach = np.linalg.norm(shapes[used], axis=2).max(axis=0, initial=0.0)
     moved = vertices[reach > MOVED_SHARE * reach.max()] if reach.max() > 0 else vertices[:0]
     if len(moved) < 3:
         raise FacesynthError(f"{path}: its shapes move nothing; export the head with its shape keys")
