@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 )
 @click.option("--rig", type=click.Path(path_type=Path), help="The head: .glb, .gltf, or a folder of OBJ files.")
 @click.option("--suggest", type=click.IntRange(min=2), help="Write POSES: so many frames worth posing, weights to be filled in.")
+@click.option("--export", "exported", type=click.Path(path_type=Path), help="Folder for what was learned, as an ONNX graph.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def retarget(
     *,
@@ -38,6 +39,7 @@ def retarget(
     outputs: tuple[Path, ...],
     rig: Path | None,
     suggest: int | None,
+    exported: Path | None,
     as_json: bool,
 ) -> None:
     """Put MOTIONS of the performer of CORPUS on a head, by the key poses in POSES.
@@ -54,8 +56,8 @@ def retarget(
     if suggest is not None:
         _suggest(recordings, poses, suggest, channels)
         return
-    if not motions or not outputs:
-        raise click.UsageError("name motions and -o, or --suggest")
+    if bool(motions) != bool(outputs) or not (outputs or exported):
+        raise click.UsageError("name motions and -o, --export, or --suggest")
     from facesynth.face.files.formats import require_suffix, write_animation
     from facesynth.face.rig.arkit_rig import load_head
     from facesynth.stage.key_poses import learned, motion_of, read_key_poses
@@ -72,6 +74,11 @@ def retarget(
             write_animation(target, animation, shown)
             click.echo(f"{target}: {animation.duration_s:.2f} s, {len(animation.names)} channels", err=True)
             written.append(str(target))
+    if exported is not None:
+        from facesynth.export.key_poses import export_key_poses
+
+        export_key_poses(exported, found, recordings.provenance())
+        written.append(str(exported))
     click.echo(json.dumps({"key_poses": len(given.frames), "written": written}) if as_json else "", nl=as_json)
 
 

@@ -10,6 +10,7 @@ from own_heads import SHAPES, write_mask
 
 from facesynth.cli import cli
 from facesynth.inference.errors import FacesynthError
+from facesynth.stage.key_poses import learned, read_key_poses
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,21 @@ def test_from_frames_worth_posing_to_a_head_that_moves(actor, tmp_path):
     assert np.corrcoef(curves["Mouth_Open"], fallen)[0, 1] > 0.95
     assert np.abs(curves["Frozen"]).max() == 0
     assert (tmp_path / f"{name}.glb").stat().st_size > 1000
+
+
+def test_what_was_learned_runs_without_torch(actor, tmp_path):
+    import onnxruntime
+
+    table = tmp_path / "poses.csv"
+    assert run(actor.path, table, "--suggest", 8).exit_code == 0
+    filled(table, actor, low=0.2)
+    result = run(actor.path, table, "--export", tmp_path / "graphs")
+    assert result.exit_code == 0, result.output
+    session = onnxruntime.InferenceSession(tmp_path / "graphs" / "key_poses.onnx")
+    motion = actor[actor.ids[1]].motion
+    (weights,) = session.run(None, {"frames": motion.frames[None]})
+    found = learned(read_key_poses(table, actor), actor).animation(motion)
+    np.testing.assert_allclose(weights[0], found.weights, atol=1e-5)
 
 
 def test_wrong_tables_end_in_one_line(actor, tmp_path):
