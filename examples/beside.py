@@ -22,7 +22,8 @@ from facesynth.corpus.importers.points import kept_videos
 from facesynth.face.draw.video import write_video
 from facesynth.face.texture.compose import Report
 from facesynth.methods.lds.method import LDS
-from facesynth.stage.likeness import likeness, speaker_of
+from facesynth.stage.likeness import likeness
+from facesynth.stage.speaker_pictures import speaker_of
 
 
 def main() -> None:

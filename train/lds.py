@@ -17,7 +17,7 @@ from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 from facesynth.methods.training import train as learn
-from facesynth.stage.likeness import save_face
+from facesynth.stage.speaker_pictures import save_face
 
 CONFIG = Path(__file__).parents[1] / "configs" / "lds.yaml"
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.types import Size
+
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.face.rig.arkit_rig import Rig
@@ -43,19 +45,18 @@ class Clock:
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), default=Path("facesynth-demo"), show_default=True
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--size", default="1280x720", show_default=True, help="Of the video.")
+@click.option("--size", type=Size(), show_default="1280x720", help="Of the video.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
+def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -> None:
     """Build the synthetic performer, train a method on it and let it say a sentence that goes through three emotions.
 
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
-    from facesynth.cli.speak import parse_size
-    from facesynth.face.rig.arkit_rig import load_head
     from facesynth.performer.build import build_performer
-    from facesynth.stage.performance import Stage, perform, write_performance
+    from facesynth.stage.performance import HeadStage
+    from facesynth.stage.request import Request
 
-    pixels = parse_size(size)
+    request = Request(seed=seed, size=size)
     clock = Clock()
     corpus = build_performer("small", seed=seed)
     clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
@@ -63,14 +64,14 @@ def demo(output: Path, seed: int, size: str, as_json: bool) -> None:
     clock.step("train", f"{model.name}: {model.capabilities.summary}")
     speech = _speech(seed)
     clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
-    rig = load_head()
-    performance = perform(model, speech, rig, Stage(seed=seed))
+    stage = HeadStage.of(request)
+    performance = stage.perform(model.synthesize(speech, seed=seed), speech)
     clock.step("motion", f"{len(performance.motion)} frames of motion at {performance.motion.fps:g} fps, on the head")
     written = [output / f"demo{suffix}" for suffix in (".csv", ".glb", ".npz", ".mp4")]
     for path in written:
-        write_performance(path, performance, rig, pixels)
+        performance.write(path)
         clock.step(path.suffix, f"{path}: {path.stat().st_size / 1e6:.1f} MB")
-    written.append(_strip(output / "demo.png", performance, rig))
+    written.append(_strip(output / "demo.png", performance, stage.rig))
     clock.step(".png", f"{written[-1]}: one picture of each emotion")
     _report(clock, written, fresh, corpus.path, as_json)
 

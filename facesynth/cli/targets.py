@@ -5,15 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
-
-import click
 
 from facesynth.inference.errors import FacesynthError
-
-if TYPE_CHECKING:
-    from facesynth.speech.hearing import Heard
 
 NAME = "{name}"
 CORPUS = "corpus.yaml"
@@ -65,21 +58,3 @@ def _check_free(plan: dict[Path, list[Path]]) -> None:
                 raise FacesynthError(f"{target} is a recording that is to be spoken; write to another file")
             if (other := writers.setdefault(target.resolve(), path)) != path:
                 raise FacesynthError(f"{other.name} and {path.name} would both be written to {target}; rename one of them")
-
-
-def write_phones(path: Path, heard: Heard) -> bool:
-    """Write what was heard as a TextGrid; one that is there and differs may have been corrected by hand and stays."""
-    from facesynth.speech.textgrid import write_textgrid
-
-    if path.exists():
-        with TemporaryDirectory() as folder:
-            write_textgrid(Path(folder) / "new.TextGrid", heard.speech.phones, heard.words)
-            if (Path(folder) / "new.TextGrid").read_bytes() == path.read_bytes():
-                return True
-        click.echo(
-            f"warning: {path} was there and differs: it stays as it is; give it with --phones, or remove it for a new one",
-            err=True,
-        )
-        return False
-    write_textgrid(path, heard.speech.phones, heard.words)
-    return True

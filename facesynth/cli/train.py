@@ -52,7 +52,7 @@ def train(
     from facesynth.corpus.workers import Workers
     from facesynth.methods.registry import method_class
     from facesynth.methods.training import train as learn
-    from facesynth.stage.likeness import save_face
+    from facesynth.stage.speaker_pictures import save_face
 
     chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
     if method == "emotion":

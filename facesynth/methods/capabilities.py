@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.inference.motion import Motion
@@ -31,6 +34,15 @@ class Option:
     def flag(self) -> str:
         """As it is written on the command line."""
         return "--" + self.name.replace("_", "-")
+
+    def checked(self, value: Any) -> Any:
+        """A value that fits; FacesynthError for any other."""
+        fitting = (int, float) if self.type is float else (self.type,)
+        low, high = (-inf if self.least is None else self.least), (inf if self.most is None else self.most)
+        if type(value) not in fitting or (self.type in (int, float) and not low <= value <= high):
+            bounds = f" from {low:g} to {high:g}" if self.type in (int, float) else ""
+            raise FacesynthError(f"{self.flag} must be a {self.type.__name__}{bounds}; got {value!r}")
+        return value
 
 
 @dataclass(frozen=True)

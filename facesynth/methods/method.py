@@ -73,6 +73,8 @@ class Method(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
+        self.path: Path | None = None
+        """Where it was loaded from."""
         self.layout: Layout | None = None
         self.fps: float = 0.0
         self.emotions: tuple[str, ...] = ()

@@ -10,13 +10,15 @@ import importlib
 from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.methods.capabilities import WORDS, Capabilities
+from facesynth.methods.capabilities import WORDS, Capabilities, Option
 
 if TYPE_CHECKING:
     from facesynth.corpus.checks.needs import Need
+    from facesynth.inference.speech import PhoneTrack
     from facesynth.methods.method import Method
 
 GROUP = "facesynth.methods"
@@ -106,12 +108,23 @@ def require(method: Method, ability: type[A]) -> A:
     return found
 
 
-def require_option(method: Method, name: str) -> None:
-    """FacesynthError, naming methods that have it, for an option of `speak` that a method has not."""
-    if method.capabilities.option(name) is None:
-        having = [one for one in known_capabilities()[0] if one.option(name)]
-        flag = next((option.flag for one in having if (option := one.option(name))), f"--{name}")
-        raise FacesynthError(f"{method.name} has no option {flag}; it is one of {_joined(one.name for one in having)}")
+def require_option(method: Method, name: str) -> Option:
+    """A method's own option of `speak`; FacesynthError, naming methods that have it, where it has not."""
+    if (own := method.capabilities.option(name)) is not None:
+        return own
+    having = {one.name: option for one in known_capabilities()[0] if (option := one.option(name))}
+    if not having:
+        raise unknown("option", name, [option.name for one in known_capabilities()[0] for option in one.options])
+    flag = next(iter(having.values())).flag
+    raise FacesynthError(f"{method.name} has no option {flag}; it is one of {_joined(having)}")
+
+
+def read_option(method: Method, name: str, value: Any, phones: PhoneTrack) -> Any:
+    """The value of a method's own option as `synthesize` takes it: a file is read, with the phones that are spoken."""
+    option = require_option(method, name)
+    if option.type is not Path:
+        return option.checked(value)
+    return resolve_name(option.reader)(Path(value), phones) if isinstance(value, str | Path) else value
 
 
 def method_class(name: str) -> type[Method]:
@@ -133,7 +146,9 @@ def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
     from facesynth.methods.method import read_header
 
-    return method_class(read_header(path)["method"]).load(path)
+    method = method_class(read_header(path)["method"]).load(path)
+    method.path = Path(path)
+    return method
 
 
 def _entries() -> Mapping[str, EntryPoint]:

@@ -1,9 +1,9 @@
-"""From speech to a face that one can watch: the way through the house, in order."""
+"""A mouth's motion on a head in three dimensions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,14 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.face.animation import FaceAnimation
+from facesynth.face.behaviour.eyes import quiet_eyes
 from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animation
+from facesynth.face.rig.arkit import ARKIT_NAMES, arkit_columns
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import unknown
+from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.inference.speech import Speech
-from facesynth.methods.method import Method
+from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.motion.sway import quiet_head
+from facesynth.stage.request import Request
 
 if TYPE_CHECKING:
     from facesynth.face.deform.skin import MarkerSkin
@@ -27,62 +30,127 @@ if TYPE_CHECKING:
 
 VIDEO_SUFFIXES = (".mp4",)
 OUTPUTS = (*VIDEO_SUFFIXES, *SUFFIXES)
+FPS, SIZE = 30.0, (1280, 720)
+"""Rate, Hz, and size of the video, px, where none is asked for."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What is said of a file that was written."""
+
+    line: str
+    """For a person."""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    """As JSON can hold it."""
+
+
+def check_output(path: str | Path) -> Path:
+    """A path whose suffix can be written; FacesynthError for any other."""
+    if Path(path).suffix.lower() not in OUTPUTS:
+        raise unknown("output type", Path(path).suffix or str(path), OUTPUTS)
+    return Path(path)
 
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """One utterance, said by a face."""
+    """One utterance, said by a head."""
 
     speech: Speech
     motion: Motion
-    """What the method made, at its own rate."""
+    """What the models made, at its own rate."""
     animation: FaceAnimation
-    """The same on the head, at the rate asked for."""
+    """The same on the built-in head, at the rate asked for."""
+    head: Rig | OwnHead
+    """The head that is shown."""
+    size: tuple[int, int]
+    """Of the video, px."""
     skin: MarkerSkin | None = None
     """The skin as the markers move it, in place of the weights, where that was asked for."""
 
+    def write(self, path: Path) -> Written:
+        """Write one output; the suffix says which. It appears whole or not at all."""
+        from facesynth.face.rig.channel_map import on_channels
+        from facesynth.face.rig.own_head import OwnHead
 
-@dataclass(frozen=True)
-class Stage:
-    """How a motion is put on the head."""
+        shown = on_channels(self.animation, self.head.map) if isinstance(self.head, OwnHead) else self.animation
+        if check_output(path).suffix.lower() in VIDEO_SUFFIXES:
+            self._write_video(path, shown)
+        else:
+            write_animation(path, shown, self.head, self.motion)
+        return Written(f"{path}: {self.speech.duration_s:.2f} s at {self.animation.fps:.5g} fps")
 
-    fps: float = 30.0
-    head_gain: float = 1.0
-    eyes_gain: float = 1.0
-    seed: int = 0
-    deform: str = "shapes"
-    """What moves the skin in pictures: `shapes` (the solved weights), or the markers by `distance` or by `regions`."""
+    def _write_video(self, path: Path, animation: FaceAnimation) -> None:
+        from facesynth.face.draw.render import Renderer
+        from facesynth.face.draw.video import write_video
 
-
-def perform(
-    method: Method,
-    speech: Speech,
-    rig: Rig,
-    stage: Stage,
-    options: Mapping[str, Any] | None = None,
-    change: Callable[[Motion], Motion] | None = None,
-) -> Performance:
-    """Synthesise and put on the head; `options` go to the method, whose motion `change` may change.
-
-    A method that makes no head motion gets a quiet sway with nods where the voice is loud.
-    """
-    motion = method.synthesize(speech, seed=stage.seed, **(options or {}))
-    motion = change(motion) if change else motion
-    lively = motion
-    if motion.head is None:
-        lively = replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), stage.seed))
-    animation = animate(
-        lively, rig, head_gain=stage.head_gain, eyes_gain=stage.eyes_gain, seed=stage.seed, phones=speech.phones
-    ).resampled(stage.fps)
-    return Performance(speech, motion, animation, _skin(motion, animation, rig, stage))
+        vertices: Callable[[int], ArrayLike] = partial(self.head.vertices, animation)
+        if isinstance(self.head, Rig):
+            require_arkit(animation, path)
+            vertices = self.skin.vertices if self.skin else vertices
+        pictures = Renderer.of(self.head, self.size).pictures(len(animation), vertices)
+        write_video(path, pictures, animation.fps, self.speech.audio, self.speech.sample_rate)
 
 
-def _skin(motion: Motion, animation: FaceAnimation, rig: Rig, stage: Stage) -> MarkerSkin | None:
-    if stage.deform == "shapes":
-        return None
-    from facesynth.face.deform.skin import marker_skin
+@dataclass(frozen=True, eq=False)
+class HeadStage:
+    """The built-in head, or one's own, ready for motion after motion."""
 
-    return marker_skin(stage.deform, rig, motion, animation)
+    rig: Rig
+    own: OwnHead | None
+    request: Request
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, request: Request) -> HeadStage:
+        """The head that a request asks for."""
+        from facesynth.face.rig.arkit_rig import load_head
+        from facesynth.face.rig.own_head import load_own_head
+
+        return cls(load_head(), load_own_head(request.rig, request.mapping) if request.rig else None, request)
+
+    def perform(self, motion: Motion, speech: Speech) -> Performance:
+        """Put a motion on the head, at the rate asked for."""
+        asked = self.request
+        motion = self._as_arkit(motion)
+        animation = animate(
+            self._with_head(motion, speech),
+            self.rig,
+            head_gain=asked.head.factor,
+            eyes_gain=asked.eyes.factor,
+            seed=asked.seed,
+            phones=speech.phones,
+            eyes=still_eyes if asked.eyes.source == "recorded" else quiet_eyes,
+        ).resampled(float(asked.fps or FPS))
+        skin = self._skin(motion, animation)
+        return Performance(speech, motion, animation, self.own or self.rig, asked.size or SIZE, skin)
+
+    def _with_head(self, motion: Motion, speech: Speech) -> Motion:
+        """The motion's own head, or a quiet sway with nods where the voice is loud."""
+        if motion.head is not None or self.request.head.source != "default":
+            return motion
+        return replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), self.request.seed))
+
+    def _as_arkit(self, motion: Motion) -> Motion:
+        """Curves under own names as ARKit's, where a mapping says how and the head that is shown has not the same names."""
+        own_names = motion.layout.kind == "curves" and not arkit_columns(motion.layout)
+        known = self.own is not None and set(self.own.names) <= set(motion.layout.names)
+        if self.request.mapping is None or not own_names or known:
+            return motion
+        from facesynth.face.rig.channel_map import ChannelMap
+        from facesynth.face.rig.mapping_file import read_mapping
+
+        names = motion.layout.names
+        given = read_mapping(self.request.mapping).channels
+        channel_map = ChannelMap.of(names, {name: channel for name, channel in given.items() if name in names})
+        frames = channel_map.arkit(motion.frames).astype(np.float32)
+        return replace(motion, frames=frames, layout=Layout("curves", ARKIT_NAMES))
+
+    def _skin(self, motion: Motion, animation: FaceAnimation) -> MarkerSkin | None:
+        if self.request.deform == "shapes":
+            return None
+        from facesynth.face.deform.skin import marker_skin
+
+        return marker_skin(self.request.deform, self.rig, motion, animation)
 
 
 def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
@@ -94,35 +162,6 @@ def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
     return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)
 
 
-def check_output(path: str | Path) -> Path:
-    """A path whose suffix can be written; FacesynthError for any other."""
-    if Path(path).suffix.lower() not in OUTPUTS:
-        raise unknown("output type", Path(path).suffix or str(path), OUTPUTS)
-    return Path(path)
-
-
-def write_performance(
-    path: str | Path, performance: Performance, head: Rig | OwnHead, size: tuple[int, int] = (1280, 720)
-) -> None:
-    """Write one output of the head that is shown; the suffix says which. It appears whole or not at all."""
-    from facesynth.face.rig.channel_map import on_channels
-    from facesynth.face.rig.own_head import OwnHead
-
-    shown = on_channels(performance.animation, head.map) if isinstance(head, OwnHead) else performance.animation
-    if check_output(path).suffix.lower() in VIDEO_SUFFIXES:
-        _write_video(path, replace(performance, animation=shown), head, size)
-    else:
-        write_animation(path, shown, head, performance.motion)
-
-
-def _write_video(path: str | Path, performance: Performance, head: Rig | OwnHead, size: tuple[int, int]) -> None:
-    from facesynth.face.draw.render import Renderer
-    from facesynth.face.draw.video import write_video
-
-    animation, speech = performance.animation, performance.speech
-    vertices: Callable[[int], ArrayLike] = partial(head.vertices, animation)
-    if isinstance(head, Rig):
-        require_arkit(animation, path)
-        vertices = performance.skin.vertices if performance.skin else vertices
-    pictures = Renderer.of(head, size).pictures(len(animation), vertices)
-    write_video(path, pictures, animation.fps, speech.audio, speech.sample_rate)
+def still_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
+    """An `EyeMotion` that leaves the eyes open and straight."""
+    return np.tile([1.0, 0.0, 0.0], (len(head), 1))

@@ -18,7 +18,7 @@ from facesynth.face.texture.speaker import Speaker
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import save_wav
-from facesynth.stage.likeness import face_path, speaker_of
+from facesynth.stage.speaker_pictures import face_path, speaker_of
 
 pytest.importorskip("cv2")
 FPS, FRAMES, RATE = 25, 50, 16_000

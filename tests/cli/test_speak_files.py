@@ -91,19 +91,22 @@ def test_a_bad_recording_does_not_stop_the_others(model, tmp_path, monkeypatch, 
     assert "1 of 3 recordings" in error
 
 
-def test_a_corrected_textgrid_stays(tmp_path, model, capsys):
-    from facesynth.cli.targets import write_phones
+def test_a_corrected_textgrid_stays(tmp_path, model):
     from facesynth.speech.hearing import Heard
+    from facesynth.stage.listening import keep_phones
+
+    told = []
 
     heard = Heard(model[1], (), (), "transcript")
     grid = tmp_path / "a.TextGrid"
-    assert write_phones(grid, heard)
-    assert write_phones(grid, heard), "the same again is no correction"
+    assert keep_phones(grid, heard, told.append)
+    assert keep_phones(grid, heard, told.append), "the same again is no correction"
     corrected = grid.read_text().replace(f'"{model[1].phones.labels[1]}"', '"aa"', 1)
     grid.write_text(corrected)
-    assert not write_phones(grid, heard)
+    assert not told
+    assert not keep_phones(grid, heard, told.append)
     assert grid.read_text() == corrected
-    assert "stays as it is" in capsys.readouterr().err
+    assert "stays as it is" in told[0]
 
 
 @pytest.mark.parametrize(
@@ -170,10 +173,10 @@ def test_a_signal_in_the_middle_leaves_nothing(model, tmp_path, sent):
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # tests that run in the background inherit deaf ears
         "import facesynth.stage.performance as s\n"
         "from facesynth.atomic import atomic_path\n"
-        "def hang(path, *rest):\n"
+        "def hang(self, path):\n"
         "    with atomic_path(path) as part:\n"
         "        part.write_bytes(b'half'); print('writing', flush=True); time.sleep(60)\n"
-        "s.write_performance = hang\n"
+        "s.Performance.write = hang\n"
     )
     command = [sys.executable, "-c", slow + PROGRAM, "speak", model[0], tmp_path / "a.wav", "-o", tmp_path / "o" / "a.npz"]
     with subprocess.Popen([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

@@ -1,0 +1,122 @@
+"""What is asked of a performance: parsed once, checked when it is made, and never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+from facesynth.inference.errors import FacesynthError, unknown
+
+AUTO = "auto"
+"""In place of an emotion, or of a track of emotions: as heard in the voice."""
+SIDES_PX = (32, 4096)
+RATES_HZ = (1, 1000)
+SOURCES = ("default", "recorded", "off")
+DEFORMS = ("shapes", "distance", "regions")
+PICTURES = ("coherent", "nearest")
+FILES = ("phones", "detector", "maps", "explain", "rig", "mapping")
+
+Source = Literal["default", "recorded", "off"]
+Deform = Literal["shapes", "distance", "regions"]
+Pictures = Literal["coherent", "nearest"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Who moves a part of the face beside the mouth, and how much."""
+
+    source: Source = "default"
+    """`recorded`: as the mouth's model knows it from its recordings, else still; `default`: the same, else quietly by
+    chance; `off`: still."""
+    gain: float = 1.0
+    """Factor on the motion."""
+
+    def __post_init__(self) -> None:
+        if self.source not in SOURCES:
+            raise unknown("source of a motion", self.source, SOURCES)
+        if not 0 <= self.gain < float("inf"):
+            raise FacesynthError(f"a factor on a motion must be 0 or above, such as 0.5; got {self.gain}")
+
+    @property
+    def factor(self) -> float:
+        """The gain; 0 for a part that is off."""
+        return 0.0 if self.source == "off" else self.gain
+
+
+@dataclass(frozen=True)
+class Request:
+    """How speech is to be said. What is None is found, or left as it is."""
+
+    text: str | None = None
+    """What is said."""
+    phones: Path | None = None
+    """A TextGrid, or lines of `end label`."""
+    emotion: str | None = None
+    """One for everything, or AUTO."""
+    emotions: str | Path | None = None
+    """A file of emotions over time, or AUTO."""
+    intensity: float = 1.0
+    """Of `emotion`, 0 to 1."""
+    detector: Path | None = None
+    """Hears the emotion; the one beside the model otherwise."""
+    to_emotion: str | None = None
+    """The motion is mapped to this emotion."""
+    to_intensity: float = 1.0
+    """Of `to_emotion`, 0 to 1."""
+    maps: Path | None = None
+    """A model whose maps `to_emotion` uses, where the mouth's own has none."""
+    own: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the mouth's own, by name; see `Capabilities.options`."""
+    explain: Path | None = None
+    """Where to write why each phone got its motion, as JSON."""
+    head: Part = Part()
+    eyes: Part = Part()
+    fps: Fraction | float | None = None
+    """Of what is written, Hz; 30 on a head, that of the pictures of a real face."""
+    size: tuple[int, int] | None = None
+    """Width and height of the video, px; 1280 x 720 of a head, that of the pictures of a real face."""
+    rig: Path | None = None
+    """A head of one's own; the built-in one otherwise."""
+    mapping: Path | None = None
+    """Which of the head's (or the model's) own channels follow which ARKit weights; the file beside the head otherwise."""
+    deform: Deform = "shapes"
+    """What moves the skin in videos: the solved shapes, or the markers, by distance along the skin or by regions."""
+    pictures: Pictures = "coherent"
+    """Of a real face: recorded ones that follow each other well, or simply the nearest."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in FILES:
+            if (path := getattr(self, name)) is not None:
+                object.__setattr__(self, name, Path(path))
+        if self.emotion is not None and self.emotions is not None:
+            raise FacesynthError("both --emotion and --emotions were given; give one")
+        if self.emotions is not None and str(self.emotions) != AUTO and self.intensity != 1:
+            raise FacesynthError("--intensity weakens --emotion; in --emotions each line has an intensity of its own")
+        if self.maps is not None and self.to_emotion is None:
+            raise FacesynthError("--maps belongs to --to-emotion; say which emotion")
+        for name in ("intensity", "to_intensity"):
+            if not 0 <= (share := getattr(self, name)) <= 1:
+                raise FacesynthError(f"{name} must lie from 0 to 1; got {share:g}")
+        for name, choices in (("deform", DEFORMS), ("pictures", PICTURES)):
+            if getattr(self, name) not in choices:
+                raise unknown(name, getattr(self, name), choices)
+        if self.fps is not None and not RATES_HZ[0] <= self.fps <= RATES_HZ[1]:
+            raise FacesynthError(f"a rate from {RATES_HZ[0]} to {RATES_HZ[1]} Hz is wanted; got {self.fps}")
+        if self.size is not None:
+            _check_size(self.size)
+
+    @property
+    def listens(self) -> bool:
+        """Whether the emotion is to be heard in the voice."""
+        return AUTO in (self.emotion, str(self.emotions))
+
+
+def _check_size(size: tuple[int, int]) -> None:
+    """FacesynthError for a size that H.264 cannot have: both sides are even."""
+    if any(side % 2 or not SIDES_PX[0] <= side <= SIDES_PX[1] for side in size):
+        wanted = f"WIDTHxHEIGHT, both even and from {SIDES_PX[0]} to {SIDES_PX[1]}, such as 1280x720"
+        raise FacesynthError(f"--size wants {wanted}; got {'x'.join(map(str, size))}")
