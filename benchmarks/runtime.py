@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from facesynth.inference import EmotionTrack, FacesynthError, PhoneTrack, Speech, load, resample
-from facesynth.inference.__main__ import read_wav
+from facesynth.inference.wav import read_wav
 from facesynth.speech.textgrid import read_textgrid
 
 STARTS, REPEATS = 7, 3

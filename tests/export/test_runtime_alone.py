@@ -3,10 +3,12 @@
 import json
 import os
 import re
+import shutil
 import struct
 import subprocess
 import sys
 import wave
+import zipfile
 
 import numpy as np
 import pytest
@@ -219,10 +221,35 @@ def test_calls_are_those_of_the_torch_models(folders):
         assert list(asked(getattr(EmotionDetector, name))) == list(asked(getattr(load(folders[3]), name)))
 
 
-def test_its_distribution_takes_every_package_of_the_folder(repository):
-    import tomllib
+def built(source, out):
+    """What pip says of building a wheel, and the names of the files in it."""
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", out, source]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    wheels = list(out.glob("*.whl"))
+    return done.stdout + done.stderr, set(zipfile.ZipFile(wheels[0]).namelist()) if wheels else set()
 
-    listed = tomllib.loads((repository / "export" / "runtime" / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+
+def test_the_wheel_carries_that_folder_alone(repository, tmp_path):
+    said, names = built(repository / "export" / "runtime", tmp_path)
     folder = repository / "facesynth" / "inference"
-    there = [".".join(("facesynth_runtime", *p.parent.relative_to(folder).parts)) for p in folder.rglob("__init__.py")]
-    assert sorted(listed) == sorted(there)
+    assert {name for name in names if ".dist-info/" not in name} == {
+        f"facesynth_runtime/{path.relative_to(folder).as_posix()}" for path in folder.rglob("*.py")
+    }, said
+    left = {path.name for path in (repository / "export" / "runtime").iterdir()}
+    assert not left & {"facesynth_runtime", "facesynth_runtime.egg-info"}
+
+
+def test_a_source_distribution_builds_the_same_wheel(repository, tmp_path):
+    copy = shutil.copytree(repository / "export" / "runtime", tmp_path / "checkout" / "export" / "runtime")
+    shutil.copytree(repository / "facesynth" / "inference", tmp_path / "checkout" / "facesynth" / "inference")
+    make = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", make, str(tmp_path)], cwd=copy, check=True, capture_output=True, timeout=120)
+    wheels = [built(source, tmp_path / name)[1] for name, source in (("a", copy), ("b", next(tmp_path.glob("*.tar.gz"))))]
+    assert wheels[0] == wheels[1] != set()
+
+
+def test_a_copy_without_its_source_says_what_it_wants(repository, tmp_path):
+    copy = shutil.copytree(repository / "export" / "runtime", tmp_path / "export" / "runtime")
+    said, names = built(copy, tmp_path / "wheels")
+    assert "it is built from facesynth/inference, two folders up; build it inside of a checkout" in said
+    assert not names
