@@ -101,7 +101,7 @@ def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     """The model for this corpus, from the cache or made now, and whether it was made now."""
     from facesynth import __version__
     from facesynth.cache import cache_dir
-    from facesynth.methods.method import FORMAT
+    from facesynth.methods.model_file import FORMAT
     from facesynth.methods.registry import DEFAULT, create, load
 
     model = create(DEFAULT)

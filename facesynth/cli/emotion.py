@@ -80,8 +80,8 @@ def _read(
     span: tuple[float, float] | None,
     output: Path | None,
 ) -> dict[str, Any]:
+    from facesynth.inference.emotion_track import track_of
     from facesynth.inference.speech import EmotionTrack
-    from facesynth.methods.emotion.detector import track_of
     from facesynth.speech.audio import load_audio, require_sound
     from facesynth.speech.emotions import write_emotions
 

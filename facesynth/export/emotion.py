@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.folder import Content
-from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.export.graph import Graph, Port
 from facesynth.export.speech_graphs import cepstrum_graph, mel_cepstra_graph
-from facesynth.methods.emotion.detector import RATE, EmotionDetector
+from facesynth.inference.contours import RATE
+from facesynth.inference.emotion_track import HOP_S, WINDOW_S
+from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.methods.emotion.probabilities import CLOSEST_TO_CERTAIN
 from facesynth.methods.emotion.svm import DEGREE
-from facesynth.speech.cepstrum import RealCepstrum
+from facesynth.methods.parts import part
+from facesynth.speech.mel_cepstra import MelCepstra
 
 
 def emotion_content(detector: EmotionDetector) -> Content:
     """Everything that the runtime needs of a trained detector."""
-    voice = detector.settings.features == "voice"
-    front = mel_cepstra_graph() if voice else cepstrum_graph(RealCepstrum(detector.settings.coefficients), RATE)
+    front = mel_cepstra_graph(detector.front) if isinstance(detector.front, MelCepstra) else cepstrum_graph(detector.front, RATE)
     return Content(
         graphs=(front, machine_graph(detector)),
         settings={
@@ -32,8 +31,9 @@ def emotion_content(detector: EmotionDetector) -> Content:
             "kernel": detector.settings.kernel,
         },
         latency={
-            "look_ahead_s": 2.0,
-            "about": "a stream reads windows of 2 s (window_s) every 0.5 s (hop_s); a reading is final when its window is full",
+            "look_ahead_s": WINDOW_S,
+            "about": f"a stream reads windows of {WINDOW_S:g} s (window_s) every {HOP_S:g} s (hop_s); "
+            "a reading is final when its window is full",
         },
         sample_rate=RATE,
     )
@@ -64,11 +64,7 @@ def machine_graph(detector: EmotionDetector) -> Graph:
     for value, port in zip((margins, probabilities, decision), outputs, strict=True):
         b.output(value, port.name, port.dtype, port.shape)
 
-    def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        row = torch.from_numpy(arrays["features"])
-        scaled_row = (row - detector.shift) * detector.scale
-        return [machine.margins(scaled_row).numpy(), detector(row).numpy(), machine.decide(scaled_row).numpy()]
-
+    judge = part(detector.judge, detector.shift.device)
     shift, spread = detector.shift.numpy(), 1 / np.maximum(detector.scale.numpy(), 1e-9)
     return Graph(
         "machine",
@@ -77,7 +73,7 @@ def machine_graph(detector: EmotionDetector) -> Graph:
         (Port("features", "float64", ("batch", width), "see settings.features"),),
         outputs,
         lambda batch, count, rng: {"features": shift + spread * rng.standard_normal((batch * count, width))},
-        reference,
+        lambda arrays: judge(**arrays),
     )
 
 

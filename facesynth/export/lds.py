@@ -20,7 +20,7 @@ def lds_content(model: LDS) -> Content:
         graphs=(features_graph(model), innovations_graph(model), rollout_graph(model)),
         settings=asdict(model.settings),
         latency={
-            "look_ahead_s": model.runtime().look_ahead_s,
+            "look_ahead_s": model.speaker().look_ahead_s,
             "about": "frame t is final when the sound up to t / fps + look_ahead_s is known; streaming equals the whole",
         },
         sample_rate=RATE,
@@ -58,7 +58,7 @@ def features_graph(model: LDS) -> Graph:
         (Port("windows", "float32", ("batch", "frames", length), "full scale 1", RATE),),
         outputs,
         lambda batch, count, rng: {"windows": (0.1 * rng.standard_normal((batch, count, length))).astype(np.float32)},
-        lambda arrays: model.runtime().features(**arrays),
+        lambda arrays: model.speaker().features(**arrays),
     )
 
 
@@ -85,7 +85,7 @@ def innovations_graph(model: LDS) -> Graph:
         (Port("uniform", "float32", ("batch", "frames", p), "0..1", model.fps),),
         (port,),
         lambda batch, count, rng: {"uniform": rng.random((batch, count, p)).astype(np.float32)},
-        lambda arrays: model.runtime().innovations(**arrays),
+        lambda arrays: model.speaker().innovations(**arrays),
     )
 
 
@@ -128,7 +128,7 @@ def rollout_graph(model: LDS) -> Graph:
             "innovations": (0.1 * rng.standard_normal((batch, count, p))).astype(np.float32),
             "state": rng.standard_normal((batch, n)).astype(np.float32),
         },
-        lambda arrays: model.runtime().rollout(**arrays),
+        lambda arrays: model.speaker().rollout(**arrays),
     )
 
 

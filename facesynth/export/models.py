@@ -11,6 +11,7 @@ from facesynth.export.weights import Weights, stored_as
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.methods.method import Method
+from facesynth.methods.model_file import read_header
 from facesynth.methods.registry import load
 
 _CONTENTS = {
@@ -28,13 +29,12 @@ def export_model(
     only: the one method that is wanted; a model of another is refused.
     """
     model = open_model(path)
-    name = "emotion" if isinstance(model, EmotionDetector) else model.name
-    if only not in (None, name):
-        raise FacesynthError(f"{path} holds a model of method {name!r}; wanted {only}. `facesynth export` takes any")
+    if only not in (None, model.name):
+        raise FacesynthError(f"{path} holds a model of method {model.name!r}; wanted {only}. `facesynth export` takes any")
     if isinstance(model, EmotionDetector):
         from facesynth.export.emotion import emotion_content
 
-        subject = Subject("emotion", model.provenance, None, None, model.emotions)
+        subject = Subject(model.name, model.provenance, None, None, model.emotions)
         return write_folder(folder, subject, stored_as(emotion_content(model), weights))
     if model.name not in _CONTENTS:
         raise FacesynthError(f"{path} holds a model of method {model.name!r}; wanted one of {', '.join(_CONTENTS)}, or emotion")
@@ -46,14 +46,4 @@ def export_model(
 
 def open_model(path: str | Path) -> Method | EmotionDetector:
     """A method or an emotion detector, whichever the file holds."""
-    from safetensors import SafetensorError, safe_open
-
-    if Path(path).is_file():
-        try:
-            with safe_open(path, "pt") as file:
-                detector = "facesynth_emotion" in (file.metadata() or {})
-        except (SafetensorError, OSError):
-            detector = False
-        if detector:
-            return EmotionDetector.load(path)
-    return load(path)
+    return EmotionDetector.load(path) if read_header(path)["method"] == EmotionDetector.name else load(path)

@@ -16,13 +16,14 @@ def export_features(folder: str | Path, weights: Weights = "float32") -> dict[st
     from facesynth.export.speech_graphs import cepstrum_graph, log_mel_graph, mel_cepstra_graph, rasta_plp_graph
     from facesynth.speech.cepstrum import RealCepstrum
     from facesynth.speech.mel import LogMel
+    from facesynth.speech.mel_cepstra import MelCepstra
     from facesynth.speech.rasta_plp import RastaPlp
 
     graphs = (
         rasta_plp_graph(RastaPlp(SAMPLE_RATE)),
         cepstrum_graph(RealCepstrum(), SAMPLE_RATE),
         log_mel_graph(LogMel(sample_rate=SAMPLE_RATE)),
-        mel_cepstra_graph(),
+        mel_cepstra_graph(MelCepstra()),
     )
     latency = {"look_ahead_s": 0.0125, "about": "half a window after the frame's centre; the cepstrum is of a whole sound"}
     content = Content(graphs, {}, latency, SAMPLE_RATE)

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder, power_spectrum
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.methods.emotion import contours
+from facesynth.inference.contours import FFT, HOP, RATE, SMALLEST_POWER, WINDOW
+from facesynth.methods.parts import part
 from facesynth.speech.cepstrum import SMALLEST_MAGNITUDE, RealCepstrum
 from facesynth.speech.mel import FLOOR, LogMel
+from facesynth.speech.mel_cepstra import BANDS, CEPSTRA, MelCepstra
 from facesynth.speech.rasta_plp import ROUNDING_POWER, RastaPlp
 
 END = 2**62
@@ -131,31 +133,24 @@ def log_mel_graph(mel: LogMel) -> Graph:
     return _of_sound(b, "natural logarithm of the energy in mel bands", port, mel.sample_rate, mel)
 
 
-def mel_cepstra_graph() -> Graph:
+def mel_cepstra_graph(mel: MelCepstra) -> Graph:
     """Sound [B, S] at 16 kHz to power [B, T, 257], log mel bands [B, T, 40] and cepstra [B, T, 20], as emotions are read from."""
     b = Builder("mel_cepstra")
     audio = b.op("Cast", b.input("audio", "float32", ("batch", "samples")), to=11)
-    frames = _framed(b, audio, contours.WINDOW, contours.HOP, contours.WINDOW // 2)
-    spectrum = np.arange(contours.FFT // 2 + 1)
-    power = power_spectrum(b, frames, np.hamming(contours.WINDOW), spectrum, contours.FFT, "float64")
-    bands = b.op("Add", b.op("MatMul", power, b.constant(contours.mel_bands())), b.constant(contours.SMALLEST_POWER, "float64"))
+    frames = _framed(b, audio, WINDOW, HOP, WINDOW // 2)
+    power = power_spectrum(b, frames, mel.window.cpu().numpy(), np.arange(FFT // 2 + 1), FFT, "float64")
+    bands = b.op("Add", b.op("MatMul", power, b.constant(mel.filters.cpu().numpy())), b.constant(SMALLEST_POWER, "float64"))
     bands = b.op("Log", bands)
-    cosines = contours.mel_cepstra(np.eye(contours.BANDS))
-    outputs = tuple(
-        Port(name, "float64", ("batch", "frames", width), unit, contours.RATE / contours.HOP)
-        for name, width, unit in (("power", 257, "power"), ("bands", contours.BANDS, "log power"), ("cepstra", 20, "none"))
-    )
-    for value, port in zip((power, bands, b.op("MatMul", bands, b.constant(cosines))), outputs, strict=True):
+    cepstra = b.op("MatMul", bands, b.constant(mel.cosines.cpu().numpy()))
+    widths = (("power", FFT // 2 + 1, "power"), ("bands", BANDS, "log power"), ("cepstra", CEPSTRA, "none"))
+    outputs = tuple(Port(name, "float64", ("batch", "frames", width), unit, RATE / HOP) for name, width, unit in widths)
+    for value, port in zip((power, bands, cepstra), outputs, strict=True):
         b.output(value, port.name, port.dtype, port.shape)
-
-    def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        framed = np.stack([contours.frames(row.astype(np.float64), contours.WINDOW) for row in arrays["audio"]])
-        strength = np.square(np.abs(np.fft.rfft(framed * np.hamming(contours.WINDOW), contours.FFT)))
-        wanted = np.log(strength @ contours.mel_bands() + contours.SMALLEST_POWER)
-        return [strength, wanted, np.stack([contours.mel_cepstra(row) for row in wanted])]
-
-    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", contours.RATE)
-    return Graph("mel_cepstra", "mel bands and cepstra (MFCC)", b.model(), (sound,), outputs, _sound, reference)
+    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", RATE)
+    reference = part(mel, mel.window.device)
+    return Graph(
+        "mel_cepstra", "mel bands and cepstra (MFCC)", b.model(), (sound,), outputs, _sound, lambda arrays: reference(**arrays)
+    )
 
 
 def _of_sound(b: Builder, about: str, port: Port, sample_rate: int, module: torch.nn.Module) -> Graph:

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import checked_audio, checked_piece, checked_rate, require_open
+from .contours import STILL, Floats
+from .emotion_track import HOP_S, NOBODY_SPEAKS, WINDOW_S, check_windows, mean_of_windows, track_of, window_starts
 from .errors import FacesynthError
 from .folder import MANIFEST, Folder
-from .graphs import Graph
+from .graphs import Graph, Part
 from .sound import checked_hz, resample
 from .speech import EmotionTrack
-from .voice import require_voice, voice_features
+from .voice import voice_features
 
 FRONT_ENDS = {"voice": "mel_cepstra", "paper": "cepstrum"}
+"""Kinds of features, and the graphs that they begin with."""
 LEAST_OF_A_SPEAKER = 4
+"""Recordings from which a speaker's own mean and spread are taken."""
 SMALLEST_SPREAD = 1e-9
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,7 @@ class Reading:
     emotion: str
     """The decision of the pairwise votes."""
     probabilities: dict[str, float]
+    """Of each emotion; the largest may be another than the decision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,26 +58,43 @@ class EmotionState:
         return self.first + len(self.heard)
 
 
-class EmotionDetector:
-    """A folder exported from an emotion detector."""
+@dataclass(frozen=True)
+class ReaderSettings:
+    """How a detector listens."""
 
-    def __init__(self, folder: Folder, threads: int) -> None:
-        self.manifest, self.settings = folder.manifest, folder.settings
-        self.emotions, self.rate = tuple(folder.manifest["emotions"]), int(folder.manifest["sample_rate"])
-        if self.settings["features"] not in FRONT_ENDS:
-            raise FacesynthError(f"{folder.path / MANIFEST}: features is {self.settings['features']!r}; wanted voice or paper")
-        self._normalise = bool(self.settings["normalise"])
-        self._front = Graph(folder, FRONT_ENDS[self.settings["features"]], threads)
-        self._machine = Graph(folder, "machine", threads)
+    features: str
+    """`voice` (statistics of timbre, pitch, dynamics and rhythm) or `paper` (three moments and the cepstrum)."""
+    normalise: bool
+    """Whether a speaker is compared with that speaker's own average."""
+    rate: int
+    """Hz of the sound that it listens to."""
+
+
+class EmotionReader:
+    """A trained detector, whether its parts are graphs of a folder or modules of torch.
+
+    Parts are called with named arrays: `front(audio [1, S])` gives power, mel bands and cepstra of a voice, or the paper's
+    cepstrum [1, n]; `machine(features [N, F])` gives margins [N, pairs], probabilities [N, K] and the decision [N].
+    """
+
+    def __init__(
+        self,
+        emotions: tuple[str, ...],
+        settings: ReaderSettings,
+        front: Part,
+        machine: Part,
+        manifest: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        self.emotions, self.settings, self.rate, self.manifest = emotions, settings, settings.rate, manifest
+        self._front, self._machine = front, machine
 
     def features(self, audio: ArrayLike, rate: int) -> Floats:
         """Audio [S] to features [F]; FacesynthError where it is constant or too short."""
         sound = resample(checked_piece(audio), rate, self.rate)
-        if self.settings["features"] == "voice":
-            require_voice(sound.astype(np.float64))
-            return voice_features(sound, self._mel)
-        if not len(sound) or float(np.ptp(sound)) < 1e-4:
-            raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
+        if self.settings.features == "voice":
+            return voice_features(sound, self._front)
+        if not len(sound) or float(np.ptp(sound)) < STILL:
+            raise FacesynthError(NOBODY_SPEAKS)
         exact = sound.astype(np.float64)
         moments = [exact.mean(), exact.var(), np.sqrt(np.mean(np.square(exact)))]
         return np.concatenate([moments, self._front(audio=sound[None])[0][0]])
@@ -85,37 +108,58 @@ class EmotionDetector:
         return np.array(self.emotions)[self._machine(features=np.asarray(x, np.float64))[2]]
 
     def detect(self, audio: ArrayLike, rate: int, speaker: Floats | None = None) -> Reading:
-        """The emotion of a whole sound [S]; `speaker`: features [N, F] of other recordings of the same speaker."""
+        """The emotion of a whole sound [S].
+
+        speaker: features [N, F] of recordings of the same speaker in mixed emotions (a minute of speech cut into pieces will
+        do); a detector that normalises needs them.
+        """
         x = self._of_speaker(self.features(audio, rate)[None], speaker)
         probabilities = self(x)[0].tolist()
         return Reading(str(self.decide(x)[0]), dict(zip(self.emotions, probabilities, strict=True)))
 
     def detect_track(
-        self, audio: ArrayLike, rate: int, *, window_s: float = 2.0, hop_s: float = 0.5, speaker: Floats | None = None
+        self, audio: ArrayLike, rate: int, *, window_s: float = WINDOW_S, hop_s: float = HOP_S, speaker: Floats | None = None
     ) -> EmotionTrack:
         """Emotions along time: the most probable one of the windows that cover each moment."""
+        return track_of(*self.along(audio, rate, window_s=window_s, hop_s=hop_s, speaker=speaker), self.emotions)
+
+    def along(
+        self,
+        audio: ArrayLike,
+        rate: int,
+        *,
+        window_s: float = WINDOW_S,
+        hop_s: float = HOP_S,
+        speaker: Floats | None = None,
+        watched: Callable[[list[float]], Iterable[float]] = iter,
+    ) -> tuple[Floats, Floats]:
+        """Ends [H] (s) of steps of `hop_s` and the probabilities [H, K] there: the mean of the windows that cover a step.
+
+        Windows in which nobody speaks do not count; where there are no others, the nearest one does. `watched` goes through
+        the windows' starts, and may show how far it is.
+        """
         sound, rate = checked_audio(audio), checked_hz(rate)
-        _check_windows(window_s, hop_s)
+        check_windows(window_s, hop_s)
         duration_s = len(sound) / rate
-        starts = window_starts(duration_s, window_s, hop_s)
-        pieces = [self._read(sound[round(s * rate) : round((s + window_s) * rate)], rate, speaker) for s in starts]
-        heard = [(s, p) for s, p in zip(starts.tolist(), pieces, strict=True) if p is not None]
-        return self._as_track(heard, window_s, hop_s, duration_s)
+        starts = window_starts(duration_s, window_s, hop_s).tolist()
+        heard = [(s, self.read(sound[round(s * rate) : round((s + window_s) * rate)], rate, speaker)) for s in watched(starts)]
+        return mean_of_windows([(s, p) for s, p in heard if p is not None], window_s, hop_s, duration_s)
 
     def stream(
-        self, *, window_s: float = 2.0, hop_s: float = 0.5, speaker: Floats | None = None, sample_rate: int | None = None
+        self,
+        *,
+        window_s: float = WINDOW_S,
+        hop_s: float = HOP_S,
+        speaker: Floats | None = None,
+        sample_rate: int | None = None,
     ) -> EmotionStream:
         """Sound in pieces of any size; `sample_rate` must be the model's."""
         checked_rate(self.rate if sample_rate is None else sample_rate, self.rate)
-        _check_windows(window_s, hop_s)
+        check_windows(window_s, hop_s)
         return EmotionStream(self, window_s, hop_s, speaker)
 
-    def _mel(self, audio: NDArray[np.float32]) -> tuple[Floats, Floats, Floats]:
-        power, bands, cepstra = self._front(audio=audio[None])
-        return power[0], bands[0], cepstra[0]
-
-    def _read(self, piece: NDArray[np.float32], rate: int, speaker: Floats | None) -> Floats | None:
-        """[K] probabilities of one window, None where it is silent."""
+    def read(self, piece: NDArray[np.float32], rate: int, speaker: Floats | None) -> Floats | None:
+        """[K] probabilities of one window, None where nobody speaks in it."""
         try:
             x = self.features(piece, rate)
         except FacesynthError:
@@ -123,31 +167,30 @@ class EmotionDetector:
         return self(self._of_speaker(x[None], speaker))[0]
 
     def _of_speaker(self, x: Floats, speaker: Floats | None) -> Floats:
-        if not self._normalise:
+        if not self.settings.normalise:
             return x
         if speaker is None or len(speaker) < LEAST_OF_A_SPEAKER:
             raise FacesynthError(
                 f"this detector compares a speaker with that speaker's own average: give it the features of at least "
-                f"{LEAST_OF_A_SPEAKER} recordings in mixed emotions; got {0 if speaker is None else len(speaker)}"
+                f"{LEAST_OF_A_SPEAKER} recordings of the speaker in mixed emotions; got {0 if speaker is None else len(speaker)}"
             )
-        return (x - speaker.mean(axis=0)) / (speaker.std(axis=0) + SMALLEST_SPREAD)
+        return beside_own_average(x, speaker)
 
-    def _as_track(self, heard: list[tuple[float, Floats]], window_s: float, hop_s: float, duration_s: float) -> EmotionTrack:
-        if not heard:
-            raise FacesynthError("the sound is constant (silence?); choose a recording in which somebody speaks")
-        centres, probabilities = np.array([s for s, _ in heard]) + window_s / 2, np.array([p for _, p in heard])
-        ends = np.append(np.arange(hop_s, duration_s - hop_s / 2, hop_s), duration_s)
-        away = np.abs(centres - (ends - hop_s / 2)[:, None])
-        covering = (away <= window_s / 2) | (away.argmin(axis=1)[:, None] == np.arange(len(centres)))
-        best = (covering @ probabilities).argmax(axis=1)
-        last = np.append(np.flatnonzero(np.diff(best)), len(best) - 1)
-        return EmotionTrack(tuple(self.emotions[k] for k in best[last]), ends[last], np.ones(len(last)))
+
+def load_detector(folder: Folder, threads: int) -> EmotionReader:
+    """The detector that was exported to a folder."""
+    manifest, features = folder.manifest, folder.settings["features"]
+    if features not in FRONT_ENDS:
+        raise FacesynthError(f"{folder.path / MANIFEST}: features is {features!r}; wanted {' or '.join(FRONT_ENDS)}")
+    settings = ReaderSettings(features, bool(folder.settings["normalise"]), int(manifest["sample_rate"]))
+    front, machine = Graph(folder, FRONT_ENDS[features], threads), Graph(folder, "machine", threads)
+    return EmotionReader(tuple(manifest["emotions"]), settings, front, machine, manifest)
 
 
 class EmotionStream:
     """`push` sound, get readings of windows; `finish` gives the track of everything."""
 
-    def __init__(self, model: EmotionDetector, window_s: float, hop_s: float, speaker: Floats | None) -> None:
+    def __init__(self, model: EmotionReader, window_s: float, hop_s: float, speaker: Floats | None) -> None:
         self.model, self.window_s, self.hop_s, self.speaker = model, window_s, hop_s, speaker
         self.state = EmotionState(np.zeros(0, np.float32), 0, 0, (), ())
         self._ended = False
@@ -179,12 +222,12 @@ class EmotionStream:
         for start_s in window_starts(duration_s, self.window_s, self.hop_s)[self.state.windows :].tolist():
             self._window(start_s)
         heard = list(zip(self.state.starts_s, self.state.probabilities, strict=True))
-        return self.model._as_track(heard, self.window_s, self.hop_s, duration_s)
+        return track_of(*mean_of_windows(heard, self.window_s, self.hop_s, duration_s), self.model.emotions)
 
     def _window(self, start_s: float) -> list[tuple[float, dict[str, float]]]:
         rate = self.model.rate
         start, stop = round(start_s * rate) - self.state.first, round((start_s + self.window_s) * rate) - self.state.first
-        read = self.model._read(self.state.heard[start:stop], rate, self.speaker)
+        read = self.model.read(self.state.heard[start:stop], rate, self.speaker)
         if read is None:
             return []
         starts, probabilities = (*self.state.starts_s, start_s), (*self.state.probabilities, read)
@@ -192,12 +235,6 @@ class EmotionStream:
         return [(start_s + self.window_s, dict(zip(self.model.emotions, read.tolist(), strict=True)))]
 
 
-def window_starts(duration_s: float, window_s: float, hop_s: float) -> Floats:
-    """[N] start of each window in seconds; the last one ends with the sound."""
-    count = max(1, int(np.ceil((duration_s - window_s) / hop_s)) + 1)
-    return np.minimum(np.arange(count) * hop_s, max(0.0, duration_s - window_s))
-
-
-def _check_windows(window_s: float, hop_s: float) -> None:
-    if not 0 < hop_s <= window_s:
-        raise FacesynthError(f"windows of {window_s} s every {hop_s} s; wanted 0 < step <= window")
+def beside_own_average(x: Floats, recordings: Floats) -> Floats:
+    """Features [N, F] in spreads from the mean of a speaker's recordings [M, F]."""
+    return (x - recordings.mean(axis=0)) / (recordings.std(axis=0) + SMALLEST_SPREAD)

@@ -13,6 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .errors import FacesynthError
+from .layout import Layout
 from .npz import view_arrays
 
 FORMAT = 3
@@ -42,6 +43,14 @@ class Folder:
         """What the method needs beside graphs and arrays."""
         settings: dict[str, Any] = self.manifest["settings"]
         return settings
+
+    @property
+    def layout(self) -> Layout:
+        """Of the motion; FacesynthError where the manifest states none that can be."""
+        try:
+            return Layout.from_dict(self.manifest["layout"])
+        except FacesynthError as error:
+            raise FacesynthError(f"{self.path / MANIFEST}: {error}; export the model again") from None
 
     def bytes_of(self, name: str) -> bytes:
         """A file's content; FacesynthError where the manifest does not list it."""

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from .errors import FacesynthError, reject_options
 from .folder import Folder
+
+Part = Callable[..., list[NDArray[Any]]]
+"""A graph of a folder, or anything else that is called with named arrays and gives its outputs in order."""
 
 
 class Graph:
     """One graph of a folder, called with named arrays: `graph(features=u, state=x)` gives its outputs in order."""
 
     def __init__(self, folder: Folder, name: str, threads: int) -> None:
+        import onnxruntime  # here: models of torch run without it
+
         if name not in folder.manifest["graphs"]:
             raise FacesynthError(f"{folder.path}: the manifest lists no graph {name!r}; export the model again")
         entry = folder.manifest["graphs"][name]

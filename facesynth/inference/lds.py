@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Self
@@ -13,13 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import checked_audio, checked_piece, checked_rate, checked_seed, require_open
 from .errors import FacesynthError, reject_options
 from .folder import MANIFEST, Folder
-from .graphs import Graph
+from .graphs import Graph, Part
 from .layout import Layout
 from .motion import Motion
 from .sound import resample
 from .windows import FrameWindows
-
-Part = Callable[..., list[NDArray[Any]]]
 
 MOST_FRAMES = 1024
 """Frames computed at once: memory does not grow with the sound."""
@@ -186,7 +184,7 @@ class LdsStream:
         return frames
 
 
-def open_lds(folder: Folder, threads: int) -> Lds:
+def load_lds(folder: Folder, threads: int) -> Lds:
     """The system that an `lds` model was exported to."""
     manifest, settings = folder.manifest, LdsSettings.from_dict(folder.settings)
     windows = settings.windows(float(manifest["fps"]), int(manifest["sample_rate"]))
@@ -197,4 +195,4 @@ def open_lds(folder: Folder, threads: int) -> Lds:
             f"{windows.look_ahead_s:g} s ahead; export the model again"
         )
     graphs = {name: Graph(folder, name, threads) for name in ("features", "innovations", "rollout")}
-    return Lds(Layout.from_dict(manifest["layout"]), tuple(manifest["emotions"]), windows, settings, manifest=manifest, **graphs)
+    return Lds(folder.layout, tuple(manifest["emotions"]), windows, settings, manifest=manifest, **graphs)

@@ -10,8 +10,8 @@ from .errors import FacesynthError, unknown
 from .folder import open_folder, stated_by_manifest
 
 _MODELS = {
-    "lds": ".lds:open_lds",
-    "emotion": ".emotion:EmotionDetector",
+    "lds": ".lds:load_lds",
+    "emotion": ".emotion:load_detector",
     "efase": ".efase.exported:load_efase",
     "anime_graph": ".anime_graph:AnimeGraph",
     "graphs": ".parts:Parts",

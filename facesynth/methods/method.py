@@ -3,42 +3,24 @@
 from __future__ import annotations
 
 import inspect
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from errno import EIO
 from pathlib import Path
 from typing import Any, ClassVar, Self, get_type_hints
 
-import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import nn
 
-from facesynth import __version__
-from facesynth.atomic import atomic_path
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Capabilities
-
-FORMAT = 2
-"""Version of the model file; a file of another version is refused."""
+from facesynth.methods.model_file import KINDS, Kinds, read_header, read_tensors, write_model
 
 _FITTING: dict[type, tuple[type, ...]] = {float: (float, int), int: (int,), bool: (bool,), str: (str,)}
-_HEADER: dict[str, type | tuple[type, ...]] = {
-    "method": str,
-    "config": dict,
-    "layout": dict,
-    "fps": (float, int),
-    "emotions": list,
-    "facts": dict,
-    "provenance": dict,
-    "tensors": dict,
-}
-"""What the header of a model file holds, and of what kind."""
+_KINDS: Kinds = {**KINDS, "layout": dict, "fps": (float, int), "facts": dict}
+"""What the header of a method's file holds, and of what kind."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +114,6 @@ class Method(nn.Module):
 
     def save(self, path: str | Path) -> None:
         """Write one safetensors file, atomically; config, layout and provenance are its metadata."""
-        tensors = {key: value.detach().cpu().contiguous() for key, value in self.state_dict().items()}
         header = {
             "method": self.name,
             "config": self.config,
@@ -141,74 +122,18 @@ class Method(nn.Module):
             "emotions": list(self.emotions),
             "facts": self.facts,
             "provenance": self.provenance,
-            "tensors": {key: list(value.shape) for key, value in tensors.items()},
-            "facesynth": __version__,
-            "format": FORMAT,
         }
-        with atomic_path(path) as part:
-            try:
-                save_file(tensors, part, metadata={"facesynth": json.dumps(header, sort_keys=True)})
-            except SafetensorError as error:  # a full disk, a limit on file sizes
-                raise OSError(EIO, f"the model cannot be written ({error})") from error
+        write_model(path, self, header)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read what `save` wrote; a truncated, foreign or other-version file is a FacesynthError."""
-        header = read_header(path)
+        header = read_header(path, _KINDS)
         if header["method"] != cls.name:
             raise FacesynthError(f"{path} holds a model of method {header['method']!r}, not {cls.name!r}")
         method = cls.from_config(header["config"])
         method.layout = Layout.from_dict(header["layout"])
         method.fps, method.emotions = float(header["fps"]), tuple(header["emotions"])
         method.facts, method.provenance = header["facts"], header["provenance"]
-        modules = dict(method.named_modules())
-        for key, tensor in _read_tensors(path, header["tensors"]).items():
-            owner, _, leaf = key.rpartition(".")
-            if owner not in modules:
-                raise FacesynthError(f"{path} was written by another version of {cls.name}, which had a {owner}; train it again")
-            _set_buffer(modules[owner], leaf, tensor)
+        read_tensors(path, method, header)
         return method.eval()
-
-
-def read_header(path: str | Path) -> dict[str, Any]:
-    """The metadata of a model file; FacesynthError says what is wrong with a file that has none."""
-    if not Path(path).is_file():
-        raise FacesynthError(f"{path}: no such model file; train one with `facesynth train`")
-    try:
-        with safe_open(path, "pt") as file:
-            text = (file.metadata() or {}).get("facesynth")
-    except (SafetensorError, OSError) as error:
-        raise FacesynthError(f"{path} is not a facesynth model, or is truncated ({error})") from None
-    if text is None:
-        raise FacesynthError(f"{path} is a safetensors file without a facesynth header; it was not written by facesynth")
-    try:
-        header = json.loads(text)
-    except ValueError:
-        raise FacesynthError(f"{path} has a damaged facesynth header; train the model again") from None
-    if not isinstance(header, dict):
-        raise FacesynthError(f"{path} has a damaged facesynth header; train the model again")
-    if header.get("format") != FORMAT:
-        raise FacesynthError(f"{path} has model format {header.get('format')}; this facesynth reads {FORMAT}: train it again")
-    if wrong := [key for key, kind in _HEADER.items() if not isinstance(header.get(key), kind)]:
-        raise FacesynthError(f"{path} has a damaged facesynth header without {', '.join(wrong)}; train the model again")
-    return header
-
-
-def _read_tensors(path: str | Path, stated: Mapping[str, Any]) -> dict[str, torch.Tensor]:
-    """The tensors of a model file, which must be those that its header states, in name and shape."""
-    with safe_open(path, "pt") as file:
-        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - safe_open is no mapping
-    found = {key: list(tensor.shape) for key, tensor in tensors.items()}
-    for key in sorted({*stated, *found}):
-        if found.get(key) != stated.get(key):
-            raise FacesynthError(
-                f"{path} is damaged: {key} has the shape {found.get(key)}, the header says {stated.get(key)}; train it again"
-            )
-    return tensors
-
-
-def _set_buffer(module: nn.Module, name: str, value: torch.Tensor) -> None:
-    if name in module._parameters:
-        module._parameters[name] = nn.Parameter(value, requires_grad=False)
-    else:
-        module.register_buffer(name, value)

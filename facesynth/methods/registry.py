@@ -144,7 +144,7 @@ def create(name: str, **config: Any) -> Method:
 
 def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
-    from facesynth.methods.method import read_header
+    from facesynth.methods.model_file import read_header
 
     method = method_class(read_header(path)["method"]).load(path)
     method.path = Path(path)

@@ -9,9 +9,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from facesynth.inference.emotion_track import track_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import EmotionTrack, Speech
-from facesynth.methods.emotion.detector import EmotionDetector, track_of
+from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.speech.hearing import Heard, hear
 from facesynth.speech.textgrid import write_textgrid
 from facesynth.stage.cast import Cast

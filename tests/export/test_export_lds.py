@@ -72,6 +72,15 @@ def test_resampled_pieces_are_the_resampled_whole(rate, new_rate, length, sizes)
         resampler.push(sound)
 
 
+def test_the_torch_model_streams_as_its_export_does(pair, speeches):
+    sound, streams = speeches[0].audio, [model.stream(seed=3) for model in pair]
+    got, wanted = (np.concatenate([s.push(sound[:4000]), s.push(sound[4000:]), s.finish()]) for s in streams)
+    assert len(got) > 20
+    assert difference(got, wanted) < 1e-5
+    with pytest.raises(FacesynthError, match="was finished"):
+        streams[0].push(sound)
+
+
 def test_sound_of_44100_hz_is_streamed(pair, speeches):
     _, runtime = pair
     sound = facesynth_resample(speeches[0].audio, 16000, 44100)

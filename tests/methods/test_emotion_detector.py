@@ -2,14 +2,16 @@ import numpy as np
 import pytest
 import soundfile
 import torch
+from scipy.fft import dct
 
+from facesynth.inference.contours import contours
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.emotion.contours import contours
 from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
-from facesynth.methods.emotion.paper_features import paper_features
 from facesynth.methods.emotion.tables import recognise
-from facesynth.methods.emotion.voice_features import voice_features
+from facesynth.methods.parts import part
 from facesynth.speech.audio import resample
+from facesynth.speech.cepstrum import RealCepstrum
+from facesynth.speech.mel_cepstra import MelCepstra
 
 RATE = 16000
 MOODS = {"calm": (110, 2.5, 0.02), "excited": (210, 6.0, 0.3)}
@@ -39,24 +41,39 @@ def detector(clips):
 
 
 def test_pitch_of_a_buzz():
-    found = contours(voice("excited", 3).astype(np.float64))
+    found = contours(voice("excited", 3), part(MelCepstra(), torch.device("cpu")))
     assert found.voiced.mean() > 0.6
     assert 180 < 100 * 2 ** np.median(found.pitch[found.voiced]) < 240
 
 
 def test_voice_features_do_not_depend_on_the_level():
-    sound = voice("calm", 1).astype(np.float64)
-    loud, soft = voice_features(sound), voice_features(sound * 0.5)
+    sound, features = voice("calm", 1), EmotionDetector().features
+    loud, soft = features(sound, RATE), features(sound * np.float32(0.5), RATE)
     assert loud.shape == (187,)
     rhythm_and_more = np.abs(loud - soft) / (np.abs(loud) + 0.1)
     assert np.median(rhythm_and_more) < 1e-3
 
 
 def test_paper_features_are_moments_and_cepstrum():
-    sound = np.random.default_rng(0).normal(size=4000)
-    features = paper_features(sound, 50)
+    sound = np.random.default_rng(0).normal(size=4000).astype(np.float32)
+    features = EmotionDetector(DetectorSettings("paper", 50)).features(sound, RATE)
+    exact = sound.astype(np.float64)
     assert features.shape == (53,)
-    np.testing.assert_allclose(features[:3], [sound.mean(), sound.var(), np.sqrt((sound**2).mean())])
+    np.testing.assert_allclose(features[:3], [exact.mean(), exact.var(), np.sqrt((exact**2).mean())])
+    np.testing.assert_allclose(features[3:], RealCepstrum(50)(torch.from_numpy(exact)).numpy())
+
+
+def test_mel_bands_and_cepstra_are_those_of_the_formulas():
+    sound = voice("calm", 2).astype(np.float64)
+    power, bands, cepstra = (found.numpy() for found in MelCepstra()(torch.from_numpy(sound)))
+    padded = np.pad(sound, (200, 400))
+    frames = np.stack([padded[k : k + 400] for k in range(0, len(sound) + 1, 160)])
+    np.testing.assert_allclose(power, np.abs(np.fft.rfft(frames * np.hamming(400), 512)) ** 2, atol=1e-9)
+    edges_mel = np.linspace(2595 * np.log10(1 + 50 / 700), 2595 * np.log10(1 + 8000 / 700), 42)
+    edges, hz = 700 * (10 ** (edges_mel / 2595) - 1), np.arange(257) * 16000 / 512
+    triangles = [np.interp(hz, edges[k : k + 3], [0, 1, 0]) for k in range(40)]
+    np.testing.assert_allclose(bands, np.log(power @ np.transpose(triangles) + 1e-8), atol=1e-4)
+    np.testing.assert_allclose(cepstra, dct(bands, norm="ortho", axis=1)[:, :20], atol=1e-4)
 
 
 @pytest.mark.parametrize("features", ["voice", "paper"])

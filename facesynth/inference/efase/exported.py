@@ -18,7 +18,6 @@ from ..errors import FacesynthError
 from ..expectation import Standard, exported_bands, exported_expectation
 from ..folder import Folder
 from ..graphs import Graph
-from ..layout import Layout
 from ..phones import PHONES, viseme_of
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -35,7 +34,7 @@ def load_efase(folder: Folder, threads: int) -> Efase:
     nodes, decode = stored_nodes(arrays), Graph(folder, "decode", threads)
     return Efase(
         Parts(
-            layout=Layout.from_dict(manifest["layout"]),
+            layout=folder.layout,
             fps=float(manifest["fps"]),
             emotions=tuple(manifest["emotions"]),
             nodes=nodes,

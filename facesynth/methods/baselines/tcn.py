@@ -6,11 +6,11 @@ from typing import Any, Self
 
 import numpy as np
 import torch
-from scipy.interpolate import CubicSpline
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.filters import spline_at
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import TCN
@@ -63,8 +63,9 @@ class Tcn(Method):
         times_s = np.arange(int(np.ceil(speech.duration_s * RATE)) + 1) / RATE
         heard = self.hearing.at(speech, times_s).T[None]  # [1, 40, F]
         coordinates = self.network(heard)[0].T * self.scale
-        frames = CubicSpline(times_s, self.pca.decode(coordinates).cpu().numpy(), axis=0)
-        return Motion(frames(np.arange(speech.phones.frame_bounds(self.fps)[-1]) / self.fps).astype(np.float32), self.fps, layout)
+        poses = self.pca.decode(coordinates).cpu().numpy().astype(np.float64)
+        frames = spline_at(poses, np.arange(speech.phones.frame_bounds(self.fps)[-1]) / self.fps * RATE)
+        return Motion(frames.astype(np.float32), self.fps, layout)
 
     def _tracks(self, utterance: Utterance) -> Tracks:
         motion = utterance.motion

@@ -49,13 +49,13 @@ def couple(pairwise: Tensor, classes: int) -> Tensor:
     [Q 1; 1ᵀ 0] [p; b] = [0; 1] and is positive by itself. Pairs are (0, 1), (0, 2), …, (1, 2), ….
     """
     safe = pairwise.to(torch.float64).clamp(CLOSEST_TO_CERTAIN, 1 - CLOSEST_TO_CERTAIN)
-    first, second = torch.tensor(list(combinations(range(classes), 2))).T
-    r = torch.zeros(*safe.shape[:-1], classes, classes, dtype=torch.float64)
+    first, second = _pairs(classes, safe.device)
+    r = safe.new_zeros(*safe.shape[:-1], classes, classes)
     r[..., first, second], r[..., second, first] = safe, 1 - safe
-    system = torch.ones(*safe.shape[:-1], classes + 1, classes + 1, dtype=torch.float64)
+    system = safe.new_ones(*safe.shape[:-1], classes + 1, classes + 1)
     system[..., :classes, :classes] = -r * r.transpose(-1, -2) + torch.diag_embed(r.square().sum(-2))
     system[..., classes, classes] = 0
-    right = torch.zeros(*safe.shape[:-1], classes + 1, 1, dtype=torch.float64)
+    right = safe.new_zeros(*safe.shape[:-1], classes + 1, 1)
     right[..., classes, 0] = 1
     solved = torch.linalg.solve(system, right)[..., :classes, 0].clamp(min=0)
     return solved / solved.sum(-1, keepdim=True)
@@ -63,9 +63,14 @@ def couple(pairwise: Tensor, classes: int) -> Tensor:
 
 def vote(margins: Tensor, classes: int) -> Tensor:
     """Margins [..., K(K-1)/2] to the class [...] that wins most pairs; ties go to the lowest, as in libsvm."""
-    first, second = torch.tensor(list(combinations(range(classes), 2))).T
-    won = torch.zeros(*margins.shape[:-1], classes, dtype=torch.int64)
+    first, second = _pairs(classes, margins.device)
     positive = (margins > 0).to(torch.int64)
+    won = positive.new_zeros(*margins.shape[:-1], classes)
     won.index_add_(won.dim() - 1, first, positive)
     won.index_add_(won.dim() - 1, second, 1 - positive)
-    return (won * (classes + 1) - torch.arange(classes)).argmax(-1)
+    return (won * (classes + 1) - torch.arange(classes, device=won.device)).argmax(-1)
+
+
+def _pairs(classes: int, device: torch.device) -> tuple[Tensor, ...]:
+    """First and second class of each pair: (0, 1), (0, 2), …, (1, 2), …"""
+    return torch.tensor(list(combinations(range(classes), 2)), device=device).T.unbind()

@@ -94,7 +94,11 @@ class Svm(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Features [..., F] to class probabilities [..., K]."""
-        exponent = self.margins(x) * self.sigmoids[:, 0] + self.sigmoids[:, 1]
+        return self.probabilities(self.margins(x))
+
+    def probabilities(self, margins: Tensor) -> Tensor:
+        """Margins [..., pairs] to class probabilities [..., K]."""
+        exponent = margins * self.sigmoids[:, 0] + self.sigmoids[:, 1]
         return couple(torch.sigmoid(-exponent), self.classes)
 
 

@@ -108,13 +108,13 @@ class LDS(Method):
 
         `noise` scales the innovations: 1 as recorded, 0 for the deterministic part alone.
         """
-        return self.runtime().synthesize(speech, seed=seed, noise=noise, **options)
+        return self.speaker().synthesize(speech, seed=seed, noise=noise, **options)
 
     def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream:
         """Sound in pieces of any size, frames as soon as they are final; `sample_rate` must be that of the periodogram."""
-        return self.runtime().stream(seed=seed, noise=noise, sample_rate=sample_rate)
+        return self.speaker().stream(seed=seed, noise=noise, sample_rate=sample_rate)
 
-    def runtime(self) -> Lds:
+    def speaker(self) -> Lds:
         """The model that speaks: what an exported folder is, with these modules for its graphs."""
         layout, device, settings = self.fitted_layout, self.rollout.A.device, self.settings
         return Lds(

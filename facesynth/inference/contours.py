@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.errors import FacesynthError
+from .errors import FacesynthError
 
 RATE = 16000
 HOP = 160
@@ -22,9 +24,12 @@ QUIETER_DB = 35.0
 """Frames this far under the loudest one are silence where an utterance begins and ends."""
 LEAST_FRAMES = 10
 SMALLEST_POWER = 1e-8
-BANDS = 40
+STILL = 1e-4
+"""A sound that moves less than this is constant."""
 
 Floats = NDArray[np.float64]
+FrontEnd = Callable[..., list[NDArray[Any]]]
+"""`audio` [1, S] at 16 kHz to power [1, T, 257], log mel bands [1, T, 40] and cepstra [1, T, 20], frames 10 ms apart."""
 _FREQUENCIES = np.arange(FFT // 2 + 1) * RATE / FFT
 
 
@@ -48,54 +53,41 @@ class Contours:
     """[T, 8] centroid, slopes and roll-off of the spectrum, its flux and zero crossings."""
 
 
-def contours(audio: Floats) -> Contours:
+def contours(audio: NDArray[np.float32], front: FrontEnd) -> Contours:
     """Contours of audio [S] at 16 kHz; FacesynthError where it is constant or too short."""
-    if len(audio) < LEAST_FRAMES * HOP or float(np.ptp(audio)) < 1e-4:
-        what = "constant (silence?)" if len(audio) >= LEAST_FRAMES * HOP else f"only {len(audio) / RATE * 1000:.0f} ms long"
-        raise FacesynthError(
-            f"the sound is {what}; to detect an emotion, somebody must speak for at least {LEAST_FRAMES * 10} ms"
-        )
-    framed = frames(audio, WINDOW)
-    power = np.square(np.abs(np.fft.rfft(framed * np.hamming(WINDOW), FFT)))
+    require_voice(audio)
+    power, bands, cepstra = (found[0] for found in front(audio=audio[None]))
     level = np.log10(power.sum(axis=1) + 10 * SMALLEST_POWER)
     loud = np.flatnonzero(level > level.max() - QUIETER_DB / 10)
     kept = slice(loud[0], max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
-    bands = np.log(power[kept] @ mel_bands() + SMALLEST_POWER)
-    pitch, periodicity = _pitch(frames(audio, PITCH_WINDOW)[kept])
+    sound = audio.astype(np.float64)
+    pitch, periodicity = _pitch(_frames(sound, PITCH_WINDOW)[kept])
     voiced = periodicity > VOICED
     if voiced.sum() < 5:
         voiced = periodicity >= np.sort(periodicity)[-5]
     return Contours(
-        bands,
-        mel_cepstra(bands),
+        bands[kept],
+        cepstra[kept],
         level[kept] - level.max(),
         _one_octave(pitch, voiced),
         periodicity,
         voiced,
-        _colour(framed[kept], power[kept], bands),
+        _colour(_frames(sound, WINDOW)[kept], power[kept], bands[kept]),
     )
 
 
-def frames(audio: Floats, length: int) -> Floats:
+def require_voice(audio: NDArray[np.float32]) -> None:
+    """FacesynthError where sound [S] at 16 kHz is constant or too short."""
+    if len(audio) >= LEAST_FRAMES * HOP and float(np.ptp(audio)) >= STILL:
+        return
+    what = "constant (silence?)" if len(audio) >= LEAST_FRAMES * HOP else f"only {len(audio) / RATE * 1000:.0f} ms long"
+    raise FacesynthError(f"the sound is {what}; to detect an emotion, somebody must speak for at least {LEAST_FRAMES * 10} ms")
+
+
+def _frames(audio: Floats, length: int) -> Floats:
     """[1 + S // HOP, length] frames centred on multiples of the hop."""
     padded = np.pad(audio, (length // 2, length))
     return np.lib.stride_tricks.sliding_window_view(padded, length)[::HOP][: 1 + len(audio) // HOP]
-
-
-def mel_bands() -> Floats:
-    """[257, 40] triangles, evenly spaced in mel from 50 Hz to 8 kHz."""
-    low, high = (2595 * np.log10(1 + f / 700) for f in (50, RATE / 2))
-    edges = 700 * (10 ** (np.linspace(low, high, BANDS + 2) / 2595) - 1)
-    rise = (_FREQUENCIES[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
-    fall = (edges[2:] - _FREQUENCIES[:, None]) / (edges[2:] - edges[1:-1])
-    return np.maximum(0, np.minimum(rise, fall))
-
-
-def mel_cepstra(bands: Floats) -> Floats:
-    """[T, 40] log mel bands to [T, 20] cepstra."""
-    from scipy.fft import dct
-
-    return dct(bands, type=2, norm="ortho", axis=1)[:, :20]
 
 
 def _pitch(framed: Floats) -> tuple[Floats, Floats]:
