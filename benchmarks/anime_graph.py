@@ -14,12 +14,12 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from facesynth.inference.anime_graph.candidates import Chooser, Maps
+from facesynth.inference.anime_graph.graph import Graph
+from facesynth.inference.anime_graph.plan import Wish, lay_steps
+from facesynth.inference.anime_graph.search import Weights, best_path, look_ahead_path, path_cost
+from facesynth.inference.phones import PHONE_INDEX
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.anime_graph.candidates import Chooser
-from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
-from facesynth.methods.anime_graph.maps import EmotionMaps
-from facesynth.methods.anime_graph.plan import Wish, lay_steps
-from facesynth.methods.anime_graph.search import Weights, best_path, look_ahead_path, path_cost
 
 NODES, PHONES_ASKED, FRAMES, HEARD, WIDTH = 10_000, 30, 10, 8, 20
 LONG_S = 62.0
@@ -161,9 +161,9 @@ def measure_trained(path, folder, weights):
     asked = (wishes, metric, weights, utterance.speech.duration_s)
     measure(model.chooser, *asked, "trained")
     neutral = replace(model.graph, emotions=np.full(len(model.graph), wishes[0].emotion))
-    measure(Chooser(cut(neutral, NODES), EmotionMaps()), *asked, f"{NODES} of them, all emotions as one")
-    measure(Chooser(cut(neutral, 500), EmotionMaps()), *asked, "500 of them, all emotions as one")
-    measure(Chooser(neutral, EmotionMaps()), *asked, "all of them, all emotions as one")
+    measure(Chooser(cut(neutral, NODES), Maps()), *asked, f"{NODES} of them, all emotions as one")
+    measure(Chooser(cut(neutral, 500), Maps()), *asked, "500 of them, all emotions as one")
+    measure(Chooser(neutral, Maps()), *asked, "all of them, all emotions as one")
     measure_long(model, long_speech(held_out, LONG_S))
 
 
@@ -180,7 +180,7 @@ def main():
     for count, label in ((NODES, "generated"), (500, "generated, small")):
         graph = generated_graph(count)
         wishes = generated_wishes(graph, PHONES_ASKED)
-        measure(Chooser(graph, EmotionMaps()), wishes, metric, weights, SECONDS_PER_PHONE * len(wishes), label)
+        measure(Chooser(graph, Maps()), wishes, metric, weights, SECONDS_PER_PHONE * len(wishes), label)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ _MODELS = {
     "lds": ".lds:load_lds",
     "emotion": ".emotion:load_detector",
     "efase": ".efase.exported:load_efase",
-    "anime_graph": ".anime_graph:AnimeGraph",
+    "anime_graph": ".anime_graph.exported:load_anime_graph",
     "graphs": ".parts:Parts",
 }
 

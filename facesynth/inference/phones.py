@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Mapping
 
 from .errors import unknown
 
@@ -30,6 +31,11 @@ VISEME_CLASSES: tuple[tuple[str, ...], ...] = (
 
 PHONES: tuple[str, ...] = tuple(phone for group in VISEME_CLASSES for phone in group)
 """Every phone that facesynth knows: ARPAbet, lower case, no stress, and `pau` for silence."""
+
+PHONE_INDEX: Mapping[str, int] = {phone: index for index, phone in enumerate(PHONES)}
+"""The place of each phone in PHONES."""
+VISEMES: tuple[int, ...] = tuple(index for index, group in enumerate(VISEME_CLASSES) for _ in group)
+"""The viseme class, 0 to 14, of each of PHONES."""
 
 VOWELS = frozenset(["aa", "ae", "ah", "ao", "aw", "ax", "ay", "eh", "er", "ey", "ih", "iy", "ow", "oy", "uh", "uw"])
 OPEN_VOWELS = frozenset(["aa", "ae", "ah", "ao", "aw", "ay"])

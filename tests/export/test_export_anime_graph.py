@@ -7,13 +7,10 @@ from hypothesis import strategies as st
 from facesynth.export.graph import difference
 from facesynth.export.models import export_model
 from facesynth.inference import FacesynthError, load
-from facesynth.inference.anime_graph.graph import best_path
-from facesynth.inference.anime_graph.hearing import audio_costs, warp_path
+from facesynth.inference.anime_graph.search import best_path, step_costs
 from facesynth.inference.folder import open_folder
 from facesynth.inference.graphs import Graph as OnnxGraph
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.anime_graph.audio_cost import audio_costs as torch_costs
-from facesynth.methods.anime_graph.audio_cost import warp_path as torch_path
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.learn import expectation as prediction
 
@@ -57,9 +54,8 @@ def test_the_path_graph_finds_the_path_of_the_runtime(pair, anime_file, exported
         for t, step in enumerate(steps):
             targets[0, t, : len(step.audio)] = runtime.weights.target(step)
             if t:
-                linked = np.flatnonzero(step.link >= 0)
-                between[0, t - 1, : len(step.audio), : step.jumps.shape[1]] = step.jumps
-                between[0, t - 1, linked, step.link[linked]] = 0.0
+                costs = step_costs(steps[t - 1], step, runtime.weights)
+                between[0, t - 1, : costs.shape[1], : costs.shape[0]] = costs.T
         got_path, got_cost = OnnxGraph(open_folder(exported(anime_file)), "path_search", 1)(targets=targets, steps=between)
         assert got_cost[0] == pytest.approx(cost, rel=1e-9)
         assert np.array_equal(got_path[0], path)
@@ -70,8 +66,8 @@ def test_the_path_graph_finds_the_path_of_the_runtime(pair, anime_file, exported
 
 def test_emotions_are_mapped_as_by_torch(pair, speeches):
     model, runtime = pair
-    assert len(runtime.pairs)
-    source, target = (model.emotions[k] for k in runtime.pairs[0])
+    assert len(runtime.mapper.maps.pairs)
+    source, target = (model.emotions[k] for k in runtime.mapper.maps.pairs[0])
     speech = felt(speeches[0], source)
     wanted = model.synthesize(speech, to_emotion=target, to_intensity=0.7)
     got = runtime.synthesize(speech, to_emotion=target, to_intensity=0.7)
@@ -139,7 +135,7 @@ def test_drawn_phones_give_what_the_whole_gives(pair, slow_pair, speeches, seed,
 def test_the_stated_guard_is_that_of_the_filter(pair, slow_pair):
     guards_s = [runtime.manifest["latency"]["guard_s"] for _, runtime in (pair, slow_pair)]
     for guard_s, (_, runtime) in zip(guards_s, (pair, slow_pair), strict=True):
-        assert guard_s == pytest.approx((runtime.settles_frames + 4) / runtime.fps + 0.3, abs=1.5 / runtime.fps)
+        assert guard_s == pytest.approx((runtime.low_pass.settles_frames + 4) / runtime.fps + 0.3, abs=1.5 / runtime.fps)
     assert guards_s[0] < guards_s[1] < 8
 
 
@@ -149,19 +145,6 @@ def test_a_graph_of_an_older_version_is_not_exported(anime_file, tmp_path):
     model.save(tmp_path / "old.safetensors")
     with pytest.raises(FacesynthError, match="older version"):
         export_model(tmp_path / "old.safetensors", tmp_path / "exported")
-
-
-@settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 9999))
-def test_warps_are_those_of_facesynth(seed):
-    rng = np.random.default_rng(seed)
-    lengths = rng.integers(1, 15, 9)
-    stops, features = np.cumsum(lengths), rng.standard_normal((int(lengths.sum()), 4))
-    wanted = rng.standard_normal((int(rng.integers(1, 12)), 4))
-    assert np.allclose(
-        audio_costs(wanted, features, stops - lengths, stops), torch_costs(wanted, features, stops - lengths, stops)
-    )
-    assert np.array_equal(warp_path(wanted, features[:7]), torch_path(wanted, features[:7]))
 
 
 def test_fewer_bits_are_smaller_and_move_nearly_the_same(anime_file, exported, pair, speeches):

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from facesynth.methods.anime_graph.assembly import Blender, Piece, bridge, warped
-from facesynth.methods.anime_graph.candidates import AS_RECORDED, Chooser
-from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
-from facesynth.methods.anime_graph.maps import EmotionMaps
+from facesynth.inference.anime_graph.assembly import Blender, Piece, warped
+from facesynth.inference.anime_graph.candidates import AS_RECORDED, Chooser, Maps
+from facesynth.inference.anime_graph.graph import Graph
+from facesynth.inference.phones import PHONE_INDEX
 
 AA, B, T = PHONE_INDEX["aa"], PHONE_INDEX["b"], PHONE_INDEX["t"]
 FPS, L = 120.0, 10
@@ -30,11 +30,11 @@ def graph_of(runs, level=100.0):
 
 def piece(graph, node, count=L):
     heard = graph.audio(node)
-    return Piece(int(graph.phones[node]), 0, node, AS_RECORDED, heard, warped(graph.motion(node), heard, heard, count))
+    return Piece(0, node, AS_RECORDED, heard, warped(graph.motion(node), heard, heard, count))
 
 
 def blended(graph, nodes, captured, counts=None):
-    blender = Blender(Chooser(graph, EmotionMaps()), FPS)
+    blender = Blender(Chooser(graph, Maps()), FPS)
     for node, linked, count in zip(nodes, captured, counts or [L] * len(nodes), strict=True):
         blender.add(piece(graph, node, count), linked)
     return np.concatenate([blender.blended(t) for t in range(len(nodes))]), blender
@@ -148,9 +148,8 @@ def test_a_node_between_two_jumps_is_continuous_on_both_sides():
 def test_fades_of_a_shared_node_keep_to_its_halves():
     graph = graph_of([[AA], [B], [T]])
     left, middle, right = (piece(graph, n) for n in range(3))
-    chooser = Chooser(graph, EmotionMaps())
-    first = bridge(chooser, left, middle, FPS, left_shared=False, right_shared=True)
-    second = bridge(chooser, middle, right, FPS, left_shared=True, right_shared=False)
+    blender = Blender(Chooser(graph, Maps()), FPS)
+    first, second = blender.bridge(left, middle, (False, True)), blender.bridge(middle, right, (True, False))
     assert np.abs(first.right[5:]).max() == 0
     assert np.abs(second.left[:4]).max() == 0
     assert np.abs(second.left[-1]).min() > 10

@@ -2,8 +2,10 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from facesynth.methods.anime_graph.audio_cost import audio_costs, warp_path
+from facesynth.inference.anime_graph.audio_cost import audio_costs, warp_path
 
 
 def every_path(m, length):
@@ -46,3 +48,35 @@ def test_a_slower_copy_costs_nothing():
     slower = np.repeat(wanted, 3, axis=0)
     assert audio_costs(wanted, slower, np.array([0]), np.array([18]))[0] == pytest.approx(0, abs=1e-12)
     np.testing.assert_allclose(warp_path(wanted, slower), np.arange(6) * 3 + 1)
+
+
+def literal_matches(wanted, heard):
+    """The pairs of frames that dynamic time-warping matches, cell by cell; of equal steps both, then the input alone."""
+    apart = np.linalg.norm(wanted[:, None] - heard, axis=2)
+    total, origin = np.full(apart.shape, np.inf), {}
+    total[0, 0] = apart[0, 0]
+    for k, f in itertools.product(*map(range, apart.shape)):
+        before = [(k - 1, f - 1), (k - 1, f), (k, f - 1)]
+        before = [cell for cell in before if min(cell) >= 0]
+        if before:
+            origin[k, f] = min(before, key=lambda cell: total[cell])
+            total[k, f] = total[origin[k, f]] + apart[k, f]
+    path = [(len(wanted) - 1, len(heard) - 1)]
+    while path[-1] in origin:
+        path.append(origin[path[-1]])
+    return path
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 9999))
+def test_warps_of_many_lengths_are_those_of_the_literal_algorithm(seed):
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 15, 9)
+    stops, features = np.cumsum(lengths), rng.standard_normal((int(lengths.sum()), 4))
+    wanted = rng.standard_normal((int(rng.integers(1, 12)), 4))
+    for start, stop, cost in zip(stops - lengths, stops, audio_costs(wanted, features, stops - lengths, stops), strict=True):
+        heard = features[start:stop]
+        matched = [[f for k, f in literal_matches(wanted, heard) if k == row] for row in range(len(wanted))]
+        means = np.array([heard[frames].mean(axis=0) for frames in matched])
+        assert cost == pytest.approx(np.linalg.norm(wanted - means, axis=1).mean())
+        np.testing.assert_array_equal(warp_path(wanted, heard), [(min(frames) + max(frames)) / 2 for frames in matched])

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.inference.anime_graph.assembly import blend
+from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.closures import ClosingLips, close_at
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
+from facesynth.methods.anime_graph.lowpass import energy_spectrum
 from facesynth.methods.anime_graph.method import AnimeGraph
-from facesynth.methods.anime_graph.plan import blend
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +84,7 @@ def test_save_and_load_give_the_same_bytes(unseen, tmp_path):
 def test_what_smoothing_leaves_lies_below_the_cutoffs(unseen):
     model, utterance = unseen
     blended, _ = blend(model.chooser, model.plan(utterance.speech), model.fps)
-    smooth = low_pass(blended, model.cutoffs_hz.numpy(), model.fps)
+    smooth = LowPass(model.cutoffs_hz.numpy(), model.fps)(blended)
     assert model.cutoffs_hz.shape == (smooth.shape[1],)
     assert share_above(smooth, model).max() <= 0.01
 
@@ -92,7 +93,7 @@ def test_smoothing_keeps_what_was_captured(corpus, model):
     kept, captured = 0.0, 0.0
     for utterance in corpus:
         motion = model.components.encode_array(utterance.motion.frames)
-        smooth = low_pass(motion, model.cutoffs_hz.numpy(), model.fps)
+        smooth = LowPass(model.cutoffs_hz.numpy(), model.fps)(motion)
         kept, captured = kept + np.square(smooth - motion.mean(axis=0)).sum(axis=0), captured + len(motion) * motion.var(axis=0)
     assert (kept / captured).min() >= 0.95
 
@@ -264,7 +265,8 @@ def test_a_minute_of_speech(model, corpus):
 def test_jumps_can_be_bridged_without_recorded_pairs(corpus, unseen):
     model, utterance = unseen
     plain = AnimeGraph(help_pairs=False).fit(corpus.split()[0])
-    hows = [{join.how for join in blend(m.chooser, m.plan(utterance.speech), m.fps)[1].joins.values()} for m in (model, plain)]
+    plans = [(m, m.plan(utterance.speech), m.config["help_pairs"]) for m in (model, plain)]
+    hows = [{j.how for j in blend(m.chooser, plan, m.fps, help_pairs=h)[1].joins.values()} for m, plan, h in plans]
     assert "help" in hows[0]
     assert hows[1] == {"extension"}
 

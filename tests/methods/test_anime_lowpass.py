@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.methods.anime_graph.lowpass import cutoffs_hz, energy_spectrum, low_pass
+from facesynth.inference.anime_graph.lowpass import LowPass
+from facesynth.methods.anime_graph.lowpass import cutoffs_hz, energy_spectrum
 
 FPS = 120.0
 T = np.arange(1200) / FPS
@@ -24,20 +25,20 @@ def test_jumps_go_and_the_movement_stays():
     rng = np.random.default_rng(0)
     captured = gaussian_filter1d(rng.normal(size=(3600, 2)), 4, axis=0)
     cutoffs = cutoffs_hz([captured], FPS)
-    smooth = low_pass(captured, cutoffs, FPS)
+    smooth = LowPass(cutoffs, FPS)(captured)
     assert (smooth.var(axis=0) / captured.var(axis=0)).min() > 0.95
     jumpy = captured + 1.5 * captured.std() * (np.arange(3600) // 30 % 2)[:, None]
     for column, cutoff in enumerate(cutoffs):
-        assert share_above(low_pass(jumpy, cutoffs, FPS)[:, [column]], cutoff).max() < 0.01
+        assert share_above(LowPass(cutoffs, FPS)(jumpy)[:, [column]], cutoff).max() < 0.01
 
 
 def test_nothing_is_shifted_and_the_ends_hold():
     motion = np.sin(2 * np.pi * 1.3 * T)[:, None] + 2
-    np.testing.assert_allclose(low_pass(motion, np.array([12.0]), FPS), motion, atol=0.02)
+    np.testing.assert_allclose(LowPass(np.array([12.0]), FPS)(motion), motion, atol=0.02)
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 7])
 def test_short_motion_survives(length):
     motion = np.ones((length, 1)) * 5
-    np.testing.assert_allclose(low_pass(motion, np.array([5.0]), FPS), motion)
-    np.testing.assert_array_equal(low_pass(motion, np.array([60.0]), FPS), motion)
+    np.testing.assert_allclose(LowPass(np.array([5.0]), FPS)(motion), motion)
+    np.testing.assert_array_equal(LowPass(np.array([60.0]), FPS)(motion), motion)

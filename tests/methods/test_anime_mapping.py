@@ -5,6 +5,7 @@ import pytest
 import torch
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.inference.anime_graph.candidates import Chooser
 from facesynth.inference.closures import keep_shut
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import lip_gap
@@ -164,7 +165,7 @@ def test_synthesis_can_be_mapped_to_another_emotion(model, corpus):
 
 def test_phones_that_an_emotion_lacks_are_mapped_from_another(model):
     only_neutral = dataclasses.replace(model.graph, emotions=np.zeros_like(model.graph.emotions))
-    chooser = type(model.chooser)(only_neutral, model.maps)
+    chooser = Chooser(only_neutral, model.chooser.maps)
     candidates = chooser.candidates(int(only_neutral.phones[0]), model.emotions.index("happy"))
     assert candidates.emotion_level == "mapped"
     assert (candidates.maps == model.maps.find(0, model.emotions.index("happy"))).all()

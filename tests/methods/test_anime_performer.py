@@ -5,11 +5,12 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from facesynth.inference.anime_graph.assembly import blend
+from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.lips import bilabial_spans, lip_gap
-from facesynth.methods.anime_graph.lowpass import energy_spectrum, low_pass
+from facesynth.methods.anime_graph.lowpass import energy_spectrum
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
-from facesynth.methods.anime_graph.plan import blend
 from facesynth.methods.anime_graph.report import MapTrial
 
 pytestmark = pytest.mark.slow
@@ -54,13 +55,14 @@ def test_lips_still_close_in_every_other_emotion(split, model):
 
 def test_no_component_holds_energy_above_its_cut_off(split, model):
     cutoffs_hz = model.cutoffs_hz.numpy()
+    low_pass = LowPass(cutoffs_hz, model.fps)
     smooth, kept, captured = [], 0.0, 0.0
     for utterance in split[1]:
         blended, _ = blend(model.chooser, model.plan(utterance.speech), model.fps)
-        smooth.append(low_pass(blended, cutoffs_hz, model.fps))
+        smooth.append(low_pass(blended))
         complete = utterance.motion.frames[np.isfinite(utterance.motion.frames).all(axis=1)]
         motion = model.components.encode_array(complete)
-        kept = kept + np.square(low_pass(motion, cutoffs_hz, model.fps) - motion.mean(axis=0)).sum(axis=0)
+        kept = kept + np.square(low_pass(motion) - motion.mean(axis=0)).sum(axis=0)
         captured = captured + np.square(motion - motion.mean(axis=0)).sum(axis=0)
     frequencies, energy = energy_spectrum(smooth, model.fps)
     above = (energy * (frequencies[:, None] > cutoffs_hz)).sum(axis=0) / energy.sum(axis=0)

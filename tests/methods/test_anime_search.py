@@ -3,8 +3,8 @@ import itertools
 import numpy as np
 import pytest
 
+from facesynth.inference.anime_graph.search import LookAhead, Step, Weights, best_path, jumps, look_ahead_path, path_cost
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.anime_graph.search import LookAhead, Step, Weights, best_path, jumps, look_ahead_path, path_cost
 
 PAPER = Weights()
 

@@ -11,17 +11,17 @@ from test_anime_search import random_steps
 
 from facesynth.config import load_config
 from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.inference.anime_graph.assembly import make_piece, mean_motion
+from facesynth.inference.anime_graph.candidates import pose_costs, stretched_motions
+from facesynth.inference.anime_graph.search import Weights, best_path, path_cost, soft_path
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import time_warp
-from facesynth.methods.anime_graph.candidates import pose_costs, stretched_motions
 from facesynth.methods.anime_graph.learning import NUMBERS, lattice_of, learn, mean_error
 from facesynth.methods.anime_graph.method import AnimeGraph
-from facesynth.methods.anime_graph.plan import make_piece
-from facesynth.methods.anime_graph.search import Weights, best_path, path_cost
-from facesynth.methods.anime_graph.soft import mean_motion, soft_path
 from facesynth.methods.learn import expectation as prediction
 from facesynth.methods.learn.descent import Logs
 from facesynth.methods.registry import load
+from facesynth.methods.training import train
 
 WEIGHTS = Weights(20.0, 1.0, 0.05, 3.0)
 SOFT = {"jump_weight": 10.0, "jump_cost_weight": 3.0, "audio_weight": 1.5, "pose_weight": 5.0, "temperature": 2.0}
@@ -140,7 +140,9 @@ def test_cold_the_mean_is_the_chosen_nodes(soft, halves):
     pieces = [
         make_piece(soft.chooser, w, c, int(i)).motion for w, c, i in zip(plan.wishes, plan.candidates, plan.path, strict=True)
     ]
-    np.testing.assert_allclose(mean_motion(soft.chooser, plan, soft.weights, 1e-7), np.concatenate(pieces), atol=1e-6)
+    np.testing.assert_allclose(
+        mean_motion(soft.chooser, plan, soft_path(plan.steps, soft.weights, 1e-7)), np.concatenate(pieces), atol=1e-6
+    )
 
 
 def test_sharpening_adds_motion_and_a_saved_model_speaks_alike(soft, halves, tmp_path):
@@ -171,7 +173,7 @@ def test_learning_does_not_make_the_held_out_error_larger_repeats_and_is_kept(ha
     found = learn(halves[0], settings, seed=2, rounds=20)
     assert 0 <= found.improvement < 1
     assert set(found.settings) == {*NUMBERS, "sharpening"}
-    model = AnimeGraph(**settings, learn=True).fit(halves[0], seed=2)
+    model = train(AnimeGraph, halves[0], {**settings, "learn": True}, seed=2)
     assert {name: model.config[name] for name in found.settings} == found.settings
     assert model.facts["learned"]["improvement"] == found.improvement
 

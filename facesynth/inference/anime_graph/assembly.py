@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..anime_graph.graph import Candidates, Nodes, Wish
-from ..anime_graph.hearing import Floats, Ints, warp_path, warp_paths
 from ..filters import gaussian
 from ..warp import time_warp
+from .audio_cost import warp_path, warp_paths
+from .candidates import Candidates, Chooser
+from .graph import Floats, Ints
+from .plan import Plan, Wish
 
 VELOCITY_LASTS_S = 0.04
+"""Time constant with which an extrapolated movement comes to rest."""
 WARP_SMOOTHING = 2.0
+"""Standard deviation, in feature frames, of the smoothing of a time-warp."""
+LEAST_SHARE = 1e-3
+"""Candidates that are less probable than this are left out of a mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,36 +27,52 @@ class Piece:
     """One phone of the output: the node that expresses it, brought to the phone's frames."""
 
     emotion: int
+    """Index of the input's emotion."""
     node: int
     map: int
+    """Number of the emotion map that its motion went through, or -1."""
     wanted: Floats
-    """[m, P]"""
+    """[m, P] the input's audio features."""
     motion: Floats
+    """[n, D] time-warped motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Join:
+    """How a jump is bridged: what is added to the unblended motion of the pieces on both sides."""
+
+    how: str
+    """`help` or `extension`."""
+    left: Floats
     """[n, D]"""
+    right: Floats
+    """[n', D]"""
 
 
-def make_piece(nodes: Nodes, wish: Wish, candidates: Candidates, chosen: int) -> Piece:
+def make_piece(chooser: Chooser, wish: Wish, candidates: Candidates, chosen: int) -> Piece:
     """The chosen node, time-warped to the phone."""
     node, number = int(candidates.nodes[chosen]), int(candidates.maps[chosen])
-    motion = warped(nodes.motion(node, number), wish.wanted, nodes.audio(node), wish.frames)
+    motion = warped(chooser.motion(node, number), wish.wanted, chooser.graph.audio(node), wish.frames)
     return Piece(wish.emotion, node, number, wish.wanted, motion)
 
 
-def likely_motions(nodes: Nodes, wish: Wish, candidates: Candidates, likely: Ints) -> Floats:
+def likely_motions(chooser: Chooser, wish: Wish, candidates: Candidates, likely: Ints) -> Floats:
     """[n, frames, D] some candidates of a phone, time-warped to it."""
-    chosen = candidates.nodes[likely].tolist()
-    heard = [nodes.audio(node) for node in chosen]
-    motions = [nodes.motion(node, number) for node, number in zip(chosen, candidates.maps[likely].tolist(), strict=True)]
+    chosen, numbers = candidates.nodes[likely].tolist(), candidates.maps[likely].tolist()
+    heard = [chooser.graph.audio(node) for node in chosen]
+    motions = [chooser.motion(node, number) for node, number in zip(chosen, numbers, strict=True)]
     together = wish.frames > 1 and len(wish.wanted) > 1
-    paths = warp_paths(wish.wanted, heard) if together else [None] * len(heard)
+    paths: Sequence[Floats | None] = warp_paths(wish.wanted, heard) if together else [None] * len(heard)
     each = zip(motions, heard, paths, strict=True)
     return np.stack([warped(motion, wish.wanted, sound, wish.frames, path) for motion, sound, path in each])
 
 
 def warped(motion: Floats, wanted: Floats, heard: Floats, count: int, path: Floats | None = None) -> Floats:
-    """Motion [L, D] that sounded like heard [L', P], brought to `count` frames of speech like wanted [m, P].
+    """Motion [L, D] of a node that sounded like heard [L', P], brought to `count` frames of speech like wanted [m, P].
 
-    path: where warping matches them, if that is known.
+    DTW of the audio says which moment of the node belongs to which moment of the input; `path` is what it says, if that
+    is known. The ends are held, and the departure from even timing is smoothed; smoothing of a monotone path, continued
+    oddly at its ends, is monotone.
     """
     if count == 0:
         return motion[:0]
@@ -58,25 +81,30 @@ def warped(motion: Floats, wanted: Floats, heard: Floats, count: int, path: Floa
     even = np.linspace(0, 1, len(wanted))
     path = (warp_path(wanted, heard) if path is None else path) / (len(heard) - 1)
     path[0], path[-1] = 0.0, 1.0
-    departure = path - even
-    margin = min(len(departure) - 1, round(4 * WARP_SMOOTHING))
-    smooth = gaussian(np.pad(departure, margin, mode="reflect", reflect_type="odd"), WARP_SMOOTHING)
-    smooth = smooth[margin : margin + len(departure)]
-    smooth[0] = smooth[-1] = 0.0
-    place = np.interp(np.linspace(0, 1, count), even, even + smooth) * (len(motion) - 1)
+    place = np.interp(np.linspace(0, 1, count), even, even + _smooth_between_zeros(path - even)) * (len(motion) - 1)
     low = np.clip(place.astype(np.int64), 0, max(len(motion) - 2, 0))
     share = (place - low)[:, None]
-    return (1 - share) * motion[low] + share * motion[np.minimum(low + 1, len(motion) - 1)]
+    return np.asarray((1 - share) * motion[low] + share * motion[np.minimum(low + 1, len(motion) - 1)])
+
+
+def _smooth_between_zeros(departure: Floats) -> Floats:
+    margin = min(len(departure) - 1, round(4 * WARP_SMOOTHING))
+    padded = np.pad(departure, margin, mode="reflect", reflect_type="odd")
+    smooth = gaussian(padded, WARP_SMOOTHING)[margin : margin + len(departure)]
+    smooth[0] = smooth[-1] = 0.0
+    return smooth
 
 
 class Blender:
     """Pieces in, blended pieces out; a piece is final when the next two are known."""
 
-    def __init__(self, nodes: Nodes, fps: float, help_pairs: bool) -> None:
-        self.nodes, self.fps, self.help_pairs = nodes, fps, help_pairs
+    def __init__(self, chooser: Chooser, fps: float, *, help_pairs: bool = True) -> None:
+        self.chooser, self.fps, self.help_pairs = chooser, fps, help_pairs
         self.pieces: list[Piece] = []
         self.jumps: list[bool] = []
-        self._joins: dict[int, tuple[Floats, Floats]] = {}
+        """For each piece whether it was jumped to."""
+        self.joins: dict[int, Join] = {}
+        """By the piece on the right."""
 
     def add(self, piece: Piece, captured: bool) -> None:
         """The next piece; `captured`: it was recorded right after the one before."""
@@ -87,62 +115,104 @@ class Blender:
         """[n, D] piece t with the joins on both of its sides; those that are not known yet count as captured."""
         motion = self.pieces[t].motion
         if self._jumped(t):
-            motion = motion + self._join(t)[1]
+            motion = motion + self._join(t).right
         if self._jumped(t + 1):
-            motion = motion + self._join(t + 1)[0]
+            motion = motion + self._join(t + 1).left
         return motion
 
     def _jumped(self, t: int) -> bool:
         return 0 <= t < len(self.jumps) and self.jumps[t]
 
-    def _join(self, t: int) -> tuple[Floats, Floats]:
-        """What is added to the pieces on the left and on the right of a jump."""
-        if t not in self._joins:
-            left, right = self.pieces[t - 1], self.pieces[t]
-            shared = (self._jumped(t - 1), self._jumped(t + 1))
-            helped = self._help(left, right) if self.help_pairs else None
-            self._joins[t] = self._extend(left, right, shared) if helped is None else _helped(left, right, helped, shared)
-        return self._joins[t]
+    def _join(self, t: int) -> Join:
+        if t not in self.joins:
+            shared = self._jumped(t - 1), self._jumped(t + 1)
+            self.joins[t] = self.bridge(self.pieces[t - 1], self.pieces[t], shared)
+        return self.joins[t]
+
+    def bridge(self, left: Piece, right: Piece, shared: tuple[bool, bool]) -> Join:
+        """The join of two pieces that were not recorded one after the other.
+
+        `shared` tells whether the left and the right piece also end in a jump on their other side; a fade between
+        extensions then keeps to the half of it that is nearer.
+        """
+        helped = self._help(left, right) if self.help_pairs else None
+        if helped is None:
+            return self._extension(left, right, shared)
+        rise, fall = _rising(len(left.motion), shared[0]), _rising(len(right.motion), shared[1])[::-1]
+        return Join("help", rise[:, None] * (helped[0] - left.motion), fall[:, None] * (helped[1] - right.motion))
 
     def _help(self, left: Piece, right: Piece) -> tuple[Floats, Floats] | None:
-        """The recorded transition between these phones, warped to both pieces' timing, if there is one."""
-        of = self.nodes
-        nodes = np.flatnonzero((of.phones == of.phones[left.node]) & (of.after >= 0))
-        nodes = nodes[of.phones[of.after[nodes]] == of.phones[right.node]]
+        """The recorded transition between these phones, warped to both pieces' timing, if the graph has one.
+
+        Among several in the best available emotion: the least audio cost, then the nearest end points.
+        """
+        chooser, graph = self.chooser, self.chooser.graph
+        nodes = np.flatnonzero((graph.phones == graph.phones[left.node]) & (graph.after >= 0))
+        nodes = nodes[graph.phones[graph.after[nodes]] == graph.phones[right.node]]
         if not len(nodes):
             return None
-        nodes, maps = next(of.by_emotion(nodes, left.emotion))
-        cost = of.sound_costs(left.wanted, nodes) + of.sound_costs(right.wanted, of.after[nodes])
-        pairs = []
-        for k in np.flatnonzero(cost <= cost.min() + 1e-9):
-            both = ((left, int(nodes[k])), (right, int(of.after[nodes[k]])))
-            pairs.append([warped(of.motion(n, int(maps[k])), p.wanted, of.audio(n), len(p.motion)) for p, n in both])
-        best = min(pairs, key=lambda pair: _ends_apart(pair, left, right))
-        return best[0], best[1]
+        _, nodes, maps = next(chooser.by_emotion(nodes, left.emotion))
+        cost = chooser.sound_costs(left.wanted, nodes) + chooser.sound_costs(right.wanted, graph.after[nodes])
+        tied = np.flatnonzero(cost <= cost.min() + 1e-9)
+        pairs = [self._help_pair(left, right, int(nodes[k]), int(maps[k])) for k in tied]
+        return min(pairs, key=lambda pair: _ends_apart(pair, left, right))
 
-    def _extend(self, left: Piece, right: Piece, shared: tuple[bool, bool]) -> tuple[Floats, Floats]:
-        """Cross-fade of the left node continued and the right node begun earlier, linear over both pieces."""
-        p, q = len(left.motion), len(right.motion)
-        of = self.nodes
-        onward = _prolonged(left.motion, of.mapped(of.following(left.node, q), left.map), q, self.fps)
-        earlier = of.mapped(of.preceding(right.node, p), right.map)
+    def _help_pair(self, left: Piece, right: Piece, node: int, number: int) -> tuple[Floats, Floats]:
+        graph = self.chooser.graph
+        m, n = (
+            warped(self.chooser.motion(of, number), piece.wanted, graph.audio(of), len(piece.motion))
+            for piece, of in ((left, node), (right, int(graph.after[node])))
+        )
+        return m, n
+
+    def _extension(self, left: Piece, right: Piece, shared: tuple[bool, bool]) -> Join:
+        """Cross-fade of the left node continued and the right node begun earlier, linear over both pieces.
+
+        As many frames as the other piece has are taken from the recording; where it ends, the movement runs out.
+        """
+        p, q, of = len(left.motion), len(right.motion), self.chooser
+        onward = _prolonged(left.motion, of.maps.through(of.graph.following(left.node, q), left.map), q, self.fps)
+        earlier = of.maps.through(of.graph.preceding(right.node, p), right.map)
         backward = _prolonged(right.motion[::-1], earlier[::-1], p, self.fps)[::-1]
-        start, stop = p // 2 if shared[0] else 0, q // 2 if shared[1] else q
-        rise = np.clip((np.arange(p + q) - start + 0.5) / max(p + stop - start, 1), 0.0, 1.0)
-        return rise[:p, None] * (backward - left.motion), (1 - rise[p:, None]) * (onward - right.motion)
+        rise = _fade(p // 2 if shared[0] else 0, p, q // 2 if shared[1] else q, q)
+        return Join("extension", rise[:p, None] * (backward - left.motion), (1 - rise[p:, None]) * (onward - right.motion))
 
 
-def _helped(left: Piece, right: Piece, pair: tuple[Floats, Floats], shared: tuple[bool, bool]) -> tuple[Floats, Floats]:
-    rise, fall = _rising(len(left.motion), shared[0]), _rising(len(right.motion), shared[1])[::-1]
-    return rise[:, None] * (pair[0] - left.motion), fall[:, None] * (pair[1] - right.motion)
+def blend(chooser: Chooser, plan: Plan, fps: float, *, help_pairs: bool = True) -> tuple[Floats, Blender]:
+    """[frames, D] blended motion of a plan, not yet smoothed, and what became of its jumps."""
+    blender = Blender(chooser, fps, help_pairs=help_pairs)
+    captured = [False, *(~plan.jumps).tolist()]
+    for wish, candidates, chosen, recorded in zip(plan.wishes, plan.candidates, plan.path, captured, strict=True):
+        blender.add(make_piece(chooser, wish, candidates, int(chosen)), recorded)
+    return np.concatenate([blender.blended(t) for t in range(len(blender.pieces))]), blender
+
+
+def mean_motion(chooser: Chooser, plan: Plan, shares_of: Sequence[Floats]) -> Floats:
+    """[frames, D] each phone the mean of its candidates by their shares [n], brought to its time; not yet smoothed."""
+    frames = []
+    for wish, candidates, shares in zip(plan.wishes, plan.candidates, shares_of, strict=True):
+        likely = np.flatnonzero(shares >= min(LEAST_SHARE, shares.max()))
+        pieces = likely_motions(chooser, wish, candidates, likely)
+        frames.append(np.tensordot(shares[likely] / shares[likely].sum(), pieces, 1))
+    return np.concatenate(frames)
 
 
 def _rising(count: int, shared: bool) -> Floats:
+    """Weight of the help: 0 at the first of `count` frames, 1 at the last.
+
+    On a node between two jumps, one weight rises while the other falls, and they sum to 1.
+    """
     return np.linspace(0.0, 1.0, count) if count > 1 else np.full(count, 0.5 if shared else 1.0)
 
 
-def _ends_apart(pair: list[Floats], left: Piece, right: Piece) -> float:
+def _ends_apart(pair: tuple[Floats, Floats], left: Piece, right: Piece) -> float:
+    """Distance of a help pair's outer end points from the pieces' own."""
     return float(np.linalg.norm(pair[0][:1] - left.motion[:1]) + np.linalg.norm(pair[1][-1:] - right.motion[-1:]))
+
+
+def _fade(start: int, p: int, stop: int, q: int) -> Floats:
+    """[p + q] 0 up to frame `start`, 1 from frame `p + stop`, linear between."""
+    return np.clip((np.arange(p + q) - start + 0.5) / max(p + stop - start, 1), 0.0, 1.0)
 
 
 def _prolonged(motion: Floats, recorded: Floats, count: int, fps: float) -> Floats:

@@ -6,13 +6,16 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from facesynth.corpus import Utterance, node_name
+from facesynth.inference.anime_graph.graph import Graph
+from facesynth.inference.anime_graph.hearing import ranges, require_sound
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import PHONE_INDEX
 from facesynth.methods.anime_graph.components import FaceComponents
-from facesynth.methods.anime_graph.features import AudioFeatures, ranges
-from facesynth.methods.anime_graph.graph import PHONE_INDEX, Graph
+from facesynth.methods.anime_graph.features import AudioFeatures
 
 _ROWS = tuple(f.name for f in fields(Graph) if f.name not in {"frames", "features", "after"})
 
@@ -37,7 +40,8 @@ class GraphBuilder:
     def add(self, utterance: Utterance) -> None:
         """The nodes of one utterance."""
         speech, frames = utterance.speech, utterance.motion.frames
-        features = self.audio.of(speech, of_what=f"utterance {utterance.id}")
+        require_sound(speech.audio, f"utterance {utterance.id}")
+        features = self.audio.of(speech)
         moved = _at_least_one(speech.phones.frame_bounds(utterance.motion.fps), len(frames))
         heard = ranges(speech.phones, self.audio.fps, len(features))
         feelings = [self.emotions.index(e) for e in speech.emotions.per_phone(speech.phones)[0]]
@@ -83,6 +87,13 @@ class GraphBuilder:
         linked = np.flatnonzero(columns["before"] >= 0)
         after[columns["before"][linked]] = linked
         return Graph(np.concatenate(self._frames), np.concatenate(self._features), after=after, **columns)
+
+
+def tensors_of(graph: Graph) -> dict[str, torch.Tensor]:
+    """The arrays by name, to be stored; frames and features in single precision. `Graph.of` is the inverse."""
+    arrays = {f.name: getattr(graph, f.name) for f in fields(graph)}
+    kinds = {name: np.float32 if array.dtype == np.float64 else np.int32 for name, array in arrays.items()}
+    return {name: torch.from_numpy(np.ascontiguousarray(array, kinds[name])) for name, array in arrays.items()}
 
 
 def _at_least_one(bounds: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -86,11 +86,11 @@ class FaceComponents(nn.Module):
 
     def encode_array(self, frames: NDArray[Any]) -> NDArray[np.float64]:
         """The same as `encode`, for arrays."""
-        return self.encode(torch.from_numpy(np.asarray(frames, np.float64))).numpy()
+        return self.encode(torch.from_numpy(np.asarray(frames, np.float64)).to(self.mean.device)).cpu().numpy()
 
     def decode_array(self, components: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same as `decode`, for arrays."""
-        return self.decode(torch.from_numpy(components)).numpy()
+        return self.decode(torch.from_numpy(components).to(self.mean.device)).cpu().numpy()
 
 
 def block_columns(layout: Layout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

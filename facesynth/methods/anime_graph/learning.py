@@ -1,4 +1,4 @@
-"""Weights of the cost of the anime graph, learned by gradient through the mean over paths; see `efase.descent`.
+"""Weights of the cost of the anime graph, learned by gradient through the mean over paths; see `learn.descent`.
 
 As in eFASE the mean is differentiable in every cost, and so is its distance to recordings that the graph does not have.
 Learned are the weights of jumps, of their size, of the sound and of the expected pose; the temperature is what they are
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -18,15 +18,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.anime_graph.candidates import stretched_motions
+from facesynth.inference.anime_graph.plan import lay_steps
+from facesynth.inference.anime_graph.search import Weights, step_terms
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.anime_graph.candidates import stretched_motions
-from facesynth.methods.anime_graph.method import AnimeGraph
-from facesynth.methods.anime_graph.plan import lay_steps
-from facesynth.methods.anime_graph.soft import step_terms
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.progress import track
+
+if TYPE_CHECKING:
+    from facesynth.methods.anime_graph.method import AnimeGraph
 
 NUMBERS = ("jump_weight", "jump_cost_weight", "audio_weight", "pose_weight")
 CANDIDATES = 80
@@ -56,10 +58,13 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
 
     `settings` are those of `AnimeGraph`, with a temperature above 0. A sharpening above 0 is learned as well.
     """
+    from facesynth.methods.anime_graph.method import AnimeGraph  # which calls this
+
     if not settings.get("temperature", 0) > 0:
         raise FacesynthError("learning goes through the mean over paths; give a temperature above 0 (2 is a start)")
     graph, *held_out = three_parts(corpus, seed)
-    model = AnimeGraph.from_config({**settings, "learn": False}).fit(graph, seed=seed)
+    model = AnimeGraph.from_config(settings).fit(graph, seed=seed)
+    runtime = model.runtime()
     examples, others = ([lattice_of(model, u) for u in track(part, "lattices", len(part))] for part in held_out)
     logs, temperature = Logs({name: model.config[name] for name in NUMBERS}, {}), model.config["temperature"]
     errors = descend(
@@ -67,8 +72,8 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
     )
     found = logs.found()
     if model.config["sharpening"] > 0:
-        model.config |= found | {"sharpening": 0.0}
-        pairs = [(model.synthesize(u.speech), u.motion) for u in track(held_out[1], "sharpening", len(held_out[1]))]
+        runtime = replace(runtime, weights=Weights(*(found[name] for name in NUMBERS)), sharpening=0.0)
+        pairs = [(runtime.synthesize(u.speech), u.motion) for u in track(held_out[1], "sharpening", len(held_out[1]))]
         found["sharpening"] = matching_share(pairs)
     return Learned(found, errors)
 
@@ -91,16 +96,17 @@ def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> T
 
 def lattice_of(model: AnimeGraph, utterance: Utterance) -> Lattice:
     """Of one recorded utterance, the CANDIDATES of each phone that cost least by themselves under the model's weights."""
-    wishes, metric = model.wishes(utterance.speech), model.components.metric.numpy()
-    candidates, steps = lay_steps(model.chooser, wishes, metric)
-    kept = [np.sort(np.argsort(model.weights.target(step), kind="stable")[:CANDIDATES]) for step in steps]
+    runtime = model.runtime()
+    wishes, metric, chooser = runtime.wishes(utterance.speech), runtime.metric, runtime.chooser
+    candidates, steps = lay_steps(chooser, wishes, metric)
+    kept = [np.sort(np.argsort(runtime.weights.target(step), kind="stable")[:CANDIDATES]) for step in steps]
     count = sum(wish.frames for wish in wishes)
     some = [replace(c, nodes=c.nodes[k], maps=c.maps[k]) for c, k in zip(candidates, kept, strict=True)]
     terms = [[x[np.ix_(i, j)] for x in step_terms(a, b)] for (a, b), (i, j) in zip(pairwise(steps), pairwise(kept), strict=True)]
     return Lattice(
         _tensors(step.audio[k] for step, k in zip(steps, kept, strict=True)),
         _tensors(np.zeros(len(k)) if step.pose is None else step.pose[k] for step, k in zip(steps, kept, strict=True)),
-        _tensors(stretched_motions(model.chooser, c, w.frames) @ metric for c, w in zip(some, wishes, strict=True)),
+        _tensors(stretched_motions(chooser, c, w.frames) @ metric for c, w in zip(some, wishes, strict=True)),
         _tensors(jumps for jumps, _ in terms),
         _tensors(apart for _, apart in terms),
         with_gaps(model.in_metric(torch.from_numpy(utterance.motion.frames)), count),

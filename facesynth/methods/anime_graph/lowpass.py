@@ -1,4 +1,4 @@
-"""The low-pass filter whose cut-offs the data name (Cao 2005, §4.3, smoothing)."""
+"""Cut-off frequencies that the data name (Cao 2005, §4.3, smoothing)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ ENERGY_SHARE = 0.99
 """Share of a component's energy that lies below its cut-off frequency."""
 SEGMENT_S = 1.0
 """Length of the stretches whose spectra are averaged; half of it overlaps."""
-ORDER = 6
-"""Order of the Butterworth filter, which runs forth and back."""
-PASS_ALL = 0.98
-"""Cut-offs above this share of half the frame rate need no filter."""
 
 
 def energy_spectrum(pieces: Iterable[NDArray[np.float64]], fps: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -38,16 +34,3 @@ def cutoffs_hz(pieces: Iterable[NDArray[np.float64]], fps: float) -> NDArray[np.
     frequencies, energy = energy_spectrum(pieces, fps)
     share = np.cumsum(energy, axis=0) / np.maximum(energy.sum(axis=0), np.finfo(float).tiny)
     return frequencies[np.minimum((share < ENERGY_SHARE).sum(axis=0) + 1, len(frequencies) - 1)]
-
-
-def low_pass(components: NDArray[np.float64], cutoffs: NDArray[np.float64], fps: float) -> NDArray[np.float64]:
-    """Components [T, D] without what lies above each one's cut-off (Hz), nothing shifted in time."""
-    from scipy.signal import butter, sosfiltfilt
-
-    smooth = components.copy()
-    for column, cutoff in enumerate(cutoffs):
-        if cutoff < PASS_ALL * fps / 2 and len(components) > 1:
-            sections = butter(ORDER, cutoff, fs=fps, output="sos")
-            padding = min(len(components) - 1, round(2 * fps / cutoff))
-            smooth[:, column] = sosfiltfilt(sections, components[:, column], padlen=padding)
-    return smooth

@@ -78,10 +78,6 @@ class EmotionMaps(nn.Module):
         found = torch.nonzero((self.pairs[:, 0] == source) & (self.pairs[:, 1] == target))
         return int(found[0]) if len(found) else None
 
-    def sources_of(self, target: int) -> Sequence[int]:
-        """The emotions from which a map leads to this one."""
-        return self.pairs[self.pairs[:, 1] == target, 0].tolist()
-
     def rbf(self, number: int) -> RbfMap:
         """The displacement of the emotional components that a map gives."""
         kernel: Kernel = "gaussian" if bool(self.gaussian[number]) else "exponential"
@@ -93,11 +89,7 @@ class EmotionMaps(nn.Module):
         change[..., self.emotional] = self.rbf(number)(components[..., self.emotional])
         return components + torch.as_tensor(intensity, dtype=components.dtype)[..., None] * change
 
-    def apply_array(
-        self, components: NDArray[np.float64], number: int, intensity: NDArray[np.float64] | float = 1.0
-    ) -> NDArray[np.float64]:
-        """The same as `forward`, for arrays; a number below 0 stands for no map."""
-        if number < 0 or not len(components):
-            return components
+    def apply_array(self, components: NDArray[np.float64], number: int) -> NDArray[np.float64]:
+        """The same as `forward`, fully and for arrays."""
         with torch.no_grad():
-            return self(torch.from_numpy(components), number, torch.as_tensor(intensity)).numpy()
+            return self(torch.from_numpy(components).to(self.shifts.device), number).cpu().numpy()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Utterance
-from facesynth.methods.anime_graph.audio_cost import warp_path
+from facesynth.inference.anime_graph.audio_cost import warp_path
 from facesynth.methods.anime_graph.components import FaceComponents
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""From speech to a path through the graph, with an account of it."""
+"""From what is asked for to a path through the graph, with an account of it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.phones import PHONES
-from facesynth.methods.anime_graph.assembly import Blender, Piece, warped
-from facesynth.methods.anime_graph.candidates import Candidates, Chooser, make_step
-from facesynth.methods.anime_graph.search import Step, Weights, best_path, jumps, look_ahead_path, path_cost
+from ..phones import PHONES
+from .candidates import Candidates, Chooser, make_step
+from .graph import VISEME_OF, Floats, Graph, Ints
+from .search import NUMPY, PathSearch, Step, Weights, jumps, look_ahead_path, path_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class Wish:
 
     phone: int
     emotion: int
-    wanted: NDArray[np.float64]
+    wanted: Floats
     """[m, P] audio features."""
     frames: int
     """Length of the phone in the output."""
-    expected: NDArray[np.float64] | None = None
+    expected: Floats | None = None
     """[frames, D] pose that the sound leads one to expect, as components times metric; None where nothing predicts it."""
 
 
@@ -37,7 +37,7 @@ class Plan:
     wishes: Sequence[Wish]
     candidates: Sequence[Candidates]
     steps: Sequence[Step]
-    path: NDArray[np.int64]
+    path: Ints
     """[T] index of the chosen one among each phone's candidates."""
     cost: float
     """Eq. 2."""
@@ -45,7 +45,7 @@ class Plan:
     """The least that any path costs."""
 
     @property
-    def nodes(self) -> NDArray[np.int64]:
+    def nodes(self) -> Ints:
         """[T] the chosen nodes."""
         return np.array([c.nodes[i] for c, i in zip(self.candidates, self.path, strict=True)])
 
@@ -73,7 +73,7 @@ class Plan:
         }
 
 
-def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float64]) -> tuple[list[Candidates], list[Step]]:
+def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: Floats) -> tuple[list[Candidates], list[Step]]:
     """Candidates and their costs for each phone."""
     candidates = [chooser.candidates(wish.phone, wish.emotion) for wish in wishes]
     before = [None, *candidates[:-1]]
@@ -82,50 +82,52 @@ def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float
 
 
 def make_plan(
-    chooser: Chooser, wishes: Sequence[Wish], metric: NDArray[np.float64], weights: Weights, look_ahead: int | None
+    chooser: Chooser,
+    wishes: Sequence[Wish],
+    metric: Floats,
+    weights: Weights,
+    look_ahead: int | None = None,
+    search: PathSearch = NUMPY,
 ) -> Plan:
     """The globally best path, or the one that a look-ahead of some phones finds."""
     candidates, steps = lay_steps(chooser, wishes, metric)
-    path, optimum = best_path(steps, weights)
+    path, optimum = search.best_path(steps, weights)
     cost = optimum
     if look_ahead is not None:
         path = look_ahead_path(steps, weights, look_ahead)
-        cost = max(optimum, path_cost(steps, path, weights))  # the same path, added up in another order
+        cost = max(optimum, path_cost(steps, path, weights))
     return Plan(wishes, candidates, steps, path, cost, optimum)
 
 
-def make_piece(chooser: Chooser, wish: Wish, candidates: Candidates, chosen: int) -> Piece:
-    """The chosen node, time-warped to the phone."""
-    node, number = int(candidates.nodes[chosen]), int(candidates.maps[chosen])
-    motion = warped(chooser.motion(node, number), wish.wanted, chooser.graph.audio(node), wish.frames)
-    return Piece(wish.phone, wish.emotion, node, number, wish.wanted, motion)
+def shares_of_others(graph: Graph, plan: Plan) -> dict[str, float]:
+    """Shares of phones said by another phone, viseme class or emotion."""
+    phones, feelings = (np.array([getattr(w, name) for w in plan.wishes]) for name in ("phone", "emotion"))
+    said, felt = graph.phones[plan.nodes], graph.emotions[plan.nodes]
+    return {
+        "other_phones": float((said != phones).mean()),
+        "other_visemes": float((VISEME_OF[said] != VISEME_OF[phones]).mean()),
+        "other_emotions": float((felt != feelings).mean()),
+    }
 
 
-def blend(chooser: Chooser, plan: Plan, fps: float) -> tuple[NDArray[np.float64], Blender]:
-    """[frames, D] blended motion of a plan, not yet smoothed, and what became of its jumps."""
-    blender = Blender(chooser, fps)
-    captured = [False, *(~plan.jumps).tolist()]
-    for wish, candidates, chosen, recorded in zip(plan.wishes, plan.candidates, plan.path, captured, strict=True):
-        blender.add(make_piece(chooser, wish, candidates, int(chosen)), recorded)
-    return np.concatenate([blender.blended(t) for t in range(len(blender.pieces))]), blender
+def explain(graph: Graph, plan: Plan, weights: Weights, names: Sequence[str], emotions: Sequence[str]) -> list[dict[str, Any]]:
+    """Per phone: the chosen node, its cost terms, the runners-up by audio, and whether phone and emotion are right.
 
-
-def explain(
-    chooser: Chooser, plan: Plan, weights: Weights, names: Sequence[str], emotions: Sequence[str]
-) -> list[dict[str, Any]]:
-    """Per phone: the chosen node, its cost terms, the runners-up by audio, and whether phone and emotion are right."""
-    graph, rows = chooser.graph, []
-    for t, (wish, node) in enumerate(zip(plan.wishes, plan.nodes, strict=True)):
+    names: of the utterances; a node is called `utterance_id:phone_number`, which stays the same when a graph is built
+    again.
+    """
+    labels = [f"{names[u]}:{n}" for u, n in zip(graph.utterances.tolist(), graph.numbers.tolist(), strict=True)]
+    jumped, rows = [False, *plan.jumps.tolist()], []
+    for t, (wish, node) in enumerate(zip(plan.wishes, plan.nodes.tolist(), strict=True)):
         step, chosen = plan.steps[t], plan.path[t]
-        jumped = t > 0 and bool(plan.jumps[t - 1])
-        apart = np.linalg.norm(plan.steps[t - 1].last[plan.path[t - 1]] - step.first[chosen]) if jumped else 0.0
-        nearest = np.argsort(step.audio, kind="stable")[:4]
+        apart = np.linalg.norm(plan.steps[t - 1].last[plan.path[t - 1]] - step.first[chosen]) if jumped[t] else 0.0
+        nearest = plan.candidates[t].nodes[np.argsort(step.audio, kind="stable")[:4]].tolist()
         rows.append(
             {
                 "phone": PHONES[wish.phone],
                 "emotion": emotions[wish.emotion],
-                "node": node_label(names, graph.utterances[node], graph.numbers[node]),
-                "jump": weights.jump * jumped,
+                "node": labels[node],
+                "jump": weights.jump * jumped[t],
                 "jump_cost": weights.jump_cost * float(apart),
                 "audio_cost": weights.audio * float(step.audio[chosen]),
                 "pose_cost": 0.0 if step.pose is None else weights.pose * float(step.pose[chosen]),
@@ -133,16 +135,7 @@ def explain(
                 "right_viseme": plan.candidates[t].phone_level != "any phone",
                 "right_emotion": bool(graph.emotions[node] == wish.emotion),
                 "mapped": bool(plan.candidates[t].maps[chosen] >= 0),
-                "nearest_by_audio": [
-                    node_label(names, graph.utterances[n], graph.numbers[n])
-                    for n in plan.candidates[t].nodes[nearest]
-                    if n != node
-                ][:3],
+                "nearest_by_audio": [labels[n] for n in nearest if n != node][:3],
             }
         )
     return rows
-
-
-def node_label(names: Sequence[str], utterance: int, number: int) -> str:
-    """`utterance_id:phone_number`, which stays the same when a graph is built again."""
-    return f"{names[utterance]}:{number}"

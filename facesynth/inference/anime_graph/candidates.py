@@ -1,18 +1,16 @@
-"""Which nodes may express a phone, and what becomes of the emotion they lack."""
+"""Which nodes may express a phone, what becomes of the emotion they lack, and what the search needs to know of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from facesynth.inference.warp import stretched
-from facesynth.methods.anime_graph.audio_cost import audio_costs
-from facesynth.methods.anime_graph.graph import Graph
-from facesynth.methods.anime_graph.maps import EmotionMaps
-from facesynth.methods.anime_graph.search import Step
+from ..warp import stretched
+from .audio_cost import audio_costs
+from .graph import Floats, Graph, Ints
+from .search import Step
 
 AS_RECORDED = -1
 """In place of the number of a map: the node's motion stays as it is."""
@@ -22,24 +20,43 @@ EMOTION_LEVELS = ("emotion", "mapped", "any emotion")
 
 
 @dataclass(frozen=True, eq=False)
+class Maps:
+    """Emotion maps: components of a motion in one emotion to those in another (Cao 2005, §5)."""
+
+    pairs: Sequence[tuple[int, int]] = ()
+    """M of (from, to), numbers of emotions."""
+    apply: Callable[[Floats, int], Floats] = lambda components, _: components
+    """Components [n, D] and the number of a map to components [n, D]."""
+
+    def through(self, components: Floats, number: int) -> Floats:
+        """[n, D] components through a map; a number below 0 is no map."""
+        return self.apply(components, number) if number >= 0 and len(components) else components
+
+
+@dataclass(frozen=True, eq=False)
 class Candidates:
     """The nodes that may express one phone of the input."""
 
-    nodes: NDArray[np.int64]
+    nodes: Ints
     """[n]"""
-    maps: NDArray[np.int64]
+    maps: Ints
     """[n] number of the emotion map that each one's motion goes through, or -1."""
     phone_level: str
     """Whether they are of the phone, of its viseme class, or of any phone."""
     emotion_level: str
     """Whether they have the emotion, are mapped to it, or have any."""
 
+    def by_map(self) -> Iterator[tuple[int, Ints]]:
+        """Each map that some of them go through, and which of them."""
+        for number in np.unique(self.maps[self.maps != AS_RECORDED]).tolist():
+            yield number, np.flatnonzero(self.maps == number)
+
 
 class Chooser:
     """Candidates by phone and emotion, remembered."""
 
-    def __init__(self, graph: Graph, maps: EmotionMaps, *, help_pairs: bool = True) -> None:
-        self.graph, self.maps, self.help_pairs = graph, maps, help_pairs
+    def __init__(self, graph: Graph, maps: Maps) -> None:
+        self.graph, self.maps = graph, maps
         self._known: dict[tuple[int, int], Candidates] = {}
 
     def candidates(self, phone: int, emotion: int) -> Candidates:
@@ -54,34 +71,36 @@ class Chooser:
         emotion_level, chosen, maps = next(self.by_emotion(nodes, emotion))
         return Candidates(chosen, maps, level, emotion_level)
 
-    def by_emotion(self, nodes: NDArray[np.int64], emotion: int) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64]]]:
+    def by_emotion(self, nodes: Ints, emotion: int) -> Iterator[tuple[str, Ints, Ints]]:
         """The levels of emotion at which some of these nodes can be had, best first: level, nodes, their maps."""
         feelings = self.graph.emotions[nodes]
         native = nodes[feelings == emotion]
         if len(native):
             yield EMOTION_LEVELS[0], native, np.full(len(native), AS_RECORDED)
-        map_of = {source: self.maps.find(source, emotion) for source in self.maps.sources_of(emotion)}
-        mapped = nodes[np.isin(feelings, list(map_of))]
-        if len(mapped):
-            yield EMOTION_LEVELS[1], mapped, self._map_numbers(mapped, map_of)
+        map_of = {source: number for number, (source, target) in enumerate(self.maps.pairs) if target == emotion}
+        reached = np.isin(feelings, list(map_of))
+        if reached.any():
+            yield EMOTION_LEVELS[1], nodes[reached], np.array([map_of[int(e)] for e in feelings[reached]])
         if len(nodes):
             yield EMOTION_LEVELS[2], nodes, np.full(len(nodes), AS_RECORDED)
 
-    def _map_numbers(self, nodes: NDArray[np.int64], map_of: Mapping[int, int | None]) -> NDArray[np.int64]:
-        return np.array([map_of[int(e)] for e in self.graph.emotions[nodes]], np.int64)
-
-    def motion(self, node: int, number: int) -> NDArray[np.float64]:
+    def motion(self, node: int, number: int) -> Floats:
         """[L, D] a node's motion, through its map."""
-        return self.maps.apply_array(self.graph.motion(node), number)
+        return self.maps.through(self.graph.motion(node), number)
+
+    def sound_costs(self, wanted: Floats, nodes: Ints) -> Floats:
+        """[n] how differently nodes sound from wanted [m, P] (eq. 5)."""
+        graph = self.graph
+        return audio_costs(wanted, graph.features, graph.feature_starts[nodes], graph.feature_stops[nodes])
 
 
 def make_step(
     chooser: Chooser,
     candidates: Candidates,
     before: Candidates | None,
-    wanted: NDArray[np.float64],
-    metric: NDArray[np.float64],
-    expected: NDArray[np.float64] | None = None,
+    wanted: Floats,
+    metric: Floats,
+    expected: Floats | None = None,
 ) -> Step:
     """What the search needs to know of candidates: audio cost against wanted [m, P], end frames, captured links.
 
@@ -89,35 +108,32 @@ def make_step(
     """
     graph, nodes = chooser.graph, candidates.nodes
     first, last = graph.frames[graph.starts[nodes]], graph.frames[graph.stops[nodes] - 1]
-    for number in np.unique(candidates.maps[candidates.maps != AS_RECORDED]):
-        through = candidates.maps == number
-        first[through] = chooser.maps.apply_array(first[through], int(number))
-        last[through] = chooser.maps.apply_array(last[through], int(number))
-    audio = audio_costs(wanted, graph.features, graph.feature_starts[nodes], graph.feature_stops[nodes])
+    for number, which in candidates.by_map():
+        first[which] = chooser.maps.through(first[which], number)
+        last[which] = chooser.maps.through(last[which], number)
+    audio = chooser.sound_costs(wanted, nodes)
     pose = None if expected is None else pose_costs(chooser, candidates, expected, metric)
     return Step(audio, first @ metric, last @ metric, _links(graph, candidates, before), pose)
 
 
-def pose_costs(
-    chooser: Chooser, candidates: Candidates, expected: NDArray[np.float64], metric: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def pose_costs(chooser: Chooser, candidates: Candidates, expected: Floats, metric: Floats) -> Floats:
     """[n] mean over the frames of ‖candidate - expected‖², each candidate stretched evenly to them; see `make_step`."""
     if not len(expected):
         return np.zeros(len(candidates.nodes))
-    return ((stretched_motions(chooser, candidates, len(expected)) @ metric - expected) ** 2).sum(axis=2).mean(axis=1)
+    apart = stretched_motions(chooser, candidates, len(expected)) @ metric - expected
+    return np.einsum("nkd,nkd->n", apart, apart) / len(expected)
 
 
-def stretched_motions(chooser: Chooser, candidates: Candidates, count: int) -> NDArray[np.float64]:
+def stretched_motions(chooser: Chooser, candidates: Candidates, count: int) -> Floats:
     """[n, count, D] the motion of every candidate, through its map, stretched evenly to `count` frames."""
     motions = stretched(chooser.graph, candidates.nodes, count)
-    for number in np.unique(candidates.maps[candidates.maps != AS_RECORDED]):
-        through = candidates.maps == number
-        flat = motions[through].reshape(-1, motions.shape[2])
-        motions[through] = chooser.maps.apply_array(flat, int(number)).reshape(-1, count, motions.shape[2])
+    for number, which in candidates.by_map():
+        flat = motions[which].reshape(-1, motions.shape[2])
+        motions[which] = chooser.maps.through(flat, number).reshape(-1, count, motions.shape[2])
     return motions
 
 
-def _links(graph: Graph, candidates: Candidates, before: Candidates | None) -> NDArray[np.int64]:
+def _links(graph: Graph, candidates: Candidates, before: Candidates | None) -> Ints:
     """Where each candidate's recorded predecessor stands among those before; both must go through the same map."""
     if before is None:
         return np.full(len(candidates.nodes), -1, np.int64)
