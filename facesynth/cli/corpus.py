@@ -176,7 +176,7 @@ def add(
             workers=workers,
         )
     keep_videos_of(corpus, files, report, utterance_id)
-    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_told(corpus, report)])
+    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_summary(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
     _leave_if_nothing(not done, report.refused, "no recording was added")
 
@@ -321,7 +321,7 @@ def _words(about: Mapping[str, Any], text: str | None, text_file: Path | None) -
     return known, read_transcripts(text_file) if text_file and is_table else None
 
 
-def _told(corpus: Corpus, report: AddReport) -> list[str]:
+def _summary(corpus: Corpus, report: AddReport) -> list[str]:
     """What a person reads after an import."""
     from facesynth.corpus.add.account import account_path, phones_from
 

@@ -21,7 +21,7 @@ CUT_LEVEL = 8.0
 """Mean change of brightness (0..255) from one frame to the next above which …"""
 CUT_RATIO = 5.0
 """… and this many times the median change, there is a cut."""
-MOST_BYTES = 1_500_000_000
+LARGEST_CLIP_BYTES = 1_500_000_000
 """Of all pictures of a clip together; they are held in memory."""
 
 
@@ -44,7 +44,7 @@ def read_footage(path: str | Path) -> Footage:
     times: list[float] = []
     with open_video(path) as video:
         for time_s, image in video.images:
-            if len(frames) * image.nbytes > MOST_BYTES:
+            if len(frames) * image.nbytes > LARGEST_CLIP_BYTES:
                 raise FacesynthError(f"{path} is longer than can be held in memory; cut it into clips of a sentence or two")
             if not times or time_s > times[-1]:
                 frames.append(image)

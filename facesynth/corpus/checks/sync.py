@@ -81,7 +81,7 @@ def sync_problems(files: Files, header: Header, records: Iterable[Record]) -> It
     shifted = abs(shift_s) >= SHARED_S and clear and peaks
     if shifted:
         whose = "in all recordings the mouth" if len(pairs) > 1 else "the mouth"
-        yield Problem("audio", _told(whose, shift_s), _to_do("every sound" if len(pairs) > 1 else "the sound", shift_s))
+        yield Problem("audio", _shift_text(whose, shift_s), _remedy("every sound" if len(pairs) > 1 else "the sound", shift_s))
     if len(pairs) < FEWEST_RECORDINGS:
         unseen = "one whose sound is shifted" if shifted or abs(shift_s) < SHARED_S else "shifted sound"
         these = f"{len(pairs)} recordings are" if len(pairs) > 1 else "1 recording is"
@@ -89,7 +89,7 @@ def sync_problems(files: Files, header: Header, records: Iterable[Record]) -> It
         yield Problem("audio", what, "record more, or look at the pictures of `facesynth corpus stats --pictures`", grave=False)
         return
     for pair, shift_s in lone_shifts(pairs):
-        yield Problem(f"audio/{pair.id}.wav", _told("the mouth", shift_s), _to_do("the sound", shift_s), grave=False)
+        yield Problem(f"audio/{pair.id}.wav", _shift_text("the mouth", shift_s), _remedy("the sound", shift_s), grave=False)
 
 
 def lone_shifts(pairs: list[Pair]) -> Iterator[tuple[Pair, float]]:
@@ -182,10 +182,10 @@ def _context(heard: Floats) -> Floats:
     return np.concatenate([padded[step : step + len(heard)] for step in steps] + [np.ones((len(heard), 1))], axis=1)
 
 
-def _told(what: str, shift_s: float) -> str:
+def _shift_text(what: str, shift_s: float) -> str:
     return f"{what} moves {abs(shift_s) * 1000:.0f} ms {'after' if shift_s > 0 else 'before'} the sound"
 
 
-def _to_do(what: str, shift_s: float) -> str:
+def _remedy(what: str, shift_s: float) -> str:
     way = "delay" if shift_s > 0 else "cut the beginning of"
     return f"{way} {what} by {abs(shift_s) * 1000:.0f} ms and add it again; or is it the sound of another take?"

@@ -2,6 +2,9 @@
 
 Every fine quad carries its own little patch of texels whose outer ones lie on its edges, where the
 neighbours have the same: no texture map, no seams, and the same fineness everywhere on the face.
+
+Places in the rules are millimetres on this one mesh, from between the eyes: where its nose, cheeks, lips and ears lie.
+Colours and strengths were set by looking at pictures under this renderer's lights. Other heads bring their own colours.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ TEXELS = 8
 
 Field = NDArray[np.float64]
 
+# Linear albedos; hair and shirt are dark, since the lights are bright.
 _SKIN = np.array([0.545, 0.335, 0.245])
 _LIPS = np.array([0.43, 0.185, 0.155])
 HAIR = np.array([0.030, 0.019, 0.013])
@@ -56,7 +60,11 @@ def inside_mouth(corner_uv: NDArray[np.float32], masks: Path) -> NDArray[np.floa
 
 
 def hairline_mm(place: Field) -> Field:
-    """[...] height of a point over the hairline, mm: positive where hair grows."""
+    """[...] height of a point over the hairline, mm: positive where hair grows.
+
+    The line is 62 mm over the eyes in the middle of this forehead, falls to the sides as a parabola, and behind the front
+    (z < 95) runs down to the neck.
+    """
     x, y, z = np.moveaxis(place, -1, 0)
     across = np.abs(x)
     line = 62 - 0.0042 * x**2 - np.maximum(0, 95 - z) * 0.62 - np.maximum(0, across - 62) * 0.5
@@ -102,6 +110,12 @@ def step(low: float, high: float, x: Field) -> Field:
 
 
 def _skin(place: Field, lids: Field, lips: Field) -> Field:
+    """Linear albedo of the skin.
+
+    Mottled at four sizes, 20 mm (blotches) to half a millimetre (pores). Redder, that is less green and blue, where blood lies
+    near the surface: cheeks, nose, ears, chin; yellower on the forehead; darker under the eyes and on the lids. The bumps are
+    Gaussians over those places of this mesh, as wide as what they colour.
+    """
     x, y, z = np.moveaxis(place, -1, 0)
     across = np.abs(x)
     mottle = (
@@ -127,6 +141,7 @@ def _skin(place: Field, lids: Field, lips: Field) -> Field:
 
 
 def _stubble(place: Field) -> Field:
+    """0..1 where a shaved beard shows: from below the nose to the throat of this mesh, beginning lower at the sides."""
     x, y, z = np.moveaxis(place, -1, 0)
     beard = step(-44, -60, y + 0.12 * np.abs(x)) * step(-150, -108, y) * step(15, 62, z)
     return beard * _between(0.45, 1.25, noise(place * 2.7)) * _between(0.75, 1.1, noise(place * 0.3 + 5))
@@ -144,6 +159,7 @@ def _spots(place: Field) -> Field:
 
 
 def _gloss(place: Field, lips: Field) -> Field:
+    """0..1: skin shines most where it is oily, in the middle of the forehead and along the nose; lips more than skin."""
     x, y, z = np.moveaxis(place, -1, 0)
     oily = np.exp(-((x / 22) ** 2) - ((y - 38) / 26) ** 2) + np.exp(-((x / 13) ** 2) - ((y + 25) / 24) ** 2)
     pores = _between(0.55, 1.35, noise(place * 1.3)) * _between(0.7, 1.25, noise(place * 2.9 + 3))

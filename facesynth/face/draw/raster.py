@@ -186,6 +186,10 @@ def draw_triangle(
     """Draw one triangle into a tile: depth and owner [TILE, TILE, SAMPLES], whose corner is pixel (left, top).
 
     Samples on an edge belong to both neighbours; the nearer, or the one drawn first, wins. No gaps can open.
+
+    The weights wb and wc of corners b and c are affine in the place on the screen, so they are worked out once for a pixel's
+    middle and shifted for its samples. These lie at most 0.375 px from the middle in x and in y: a pixel whose weights are
+    further outside than that can change is passed over whole.
     """
     quad, half = triangle >> 1, triangle & 1
     a, b, c = quads[quad, 0], quads[quad, 1 + half], quads[quad, 2 + half]
