@@ -15,11 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.draw.bake import built_in_look
 from facesynth.face.draw.camera import Camera
+from facesynth.face.draw.light import KEY
 from facesynth.face.draw.look import Eyeball, Look
 from facesynth.face.draw.occlusion import orthographic
 from facesynth.face.draw.own_look import own_look
 from facesynth.face.draw.raster import FAR, TILE, bin_segments, bin_triangles, draw_depth, nearest_first, vertex_normals
-from facesynth.face.draw.shading import HIDDEN, KEY, OPEN_MM, Shot, with_bounds
+from facesynth.face.draw.shading import HIDDEN, OPEN_MM, Shot
+from facesynth.face.draw.shadow import with_bounds
 from facesynth.face.draw.strands import Strands
 from facesynth.face.draw.studio import backdrop, display_curve
 from facesynth.face.draw.tiles import NO_HAIR, Bins, Hair, draw_tiles, light_hair

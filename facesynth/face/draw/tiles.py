@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from facesynth.face.draw.light import BACK, FILL, KEY, KEY_COLOUR, RIM, RIM_COLOUR, smoothstep
 from facesynth.face.draw.raster import FAR, SAMPLES, TILE, draw_segment, draw_triangle
-from facesynth.face.draw.shading import BACK, FILL, KEY, KEY_COLOUR, RIM, RIM_COLOUR, Shot, Surface, shade, smoothstep
+from facesynth.face.draw.shading import Shot, Surface, shade
 
 
 class Hair(NamedTuple):
