@@ -13,7 +13,7 @@ import numpy as np
 from facesynth.atomic import write_text
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
-from facesynth.evaluation.lds_crossvalidation import Errors, judge_fold, table
+from facesynth.evaluation.papers.lds_crossvalidation import Errors, judge_fold, table
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 

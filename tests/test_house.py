@@ -1,12 +1,15 @@
 """The direction of the arrows: rooms import down only, and no private names of each other."""
 
 import ast
+import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 import facesynth
+from facesynth.methods.registry import BUILT_IN, capabilities_of
 
 ROOT = Path(facesynth.__file__).parent
 BELOW = {
@@ -44,6 +47,84 @@ def test_nothing_imports_the_command_line():
     for path in ROOT.rglob("*.py"):
         if "cli" not in path.parts:
             assert not any(module[1] == "cli" for module, _ in imports(path) if len(module) > 1), path
+
+
+def classes_from(path, packages):
+    """Names that a file imports from packages of methods."""
+    return {
+        name for module, names in imports(path) if module[1:2] == ["methods"] and set(module[2:3]) & packages for name in names
+    }
+
+
+def concrete():
+    """Packages that hold methods, as their capabilities state."""
+    return {capabilities_of(name).home.split(".")[2] for name in BUILT_IN}
+
+
+def test_no_method_imports_another():
+    """What several learn with is methods/learn; else each method would be changed for the sake of another."""
+    packages = {path.parent.name for path in (ROOT / "methods").glob("*/__init__.py")}
+    for path in (ROOT / "methods").rglob("*.py"):
+        own = path.relative_to(ROOT / "methods").parts[0]
+        for module, _ in imports(path):
+            if module[1] == "methods" and len(module) > 2:
+                other = module[2]
+                assert other in {own, "learn"} or other not in packages, (
+                    f"{path.relative_to(ROOT)} imports {'.'.join(module)}: a method must not know another; "
+                    "what both need belongs into methods/learn, motion or inference"
+                )
+
+
+def test_methods_are_known_by_what_they_can_do():
+    """Only a method's own room, its exporter, and the reproduction of its paper name it."""
+    packages = concrete()
+    for path in ROOT.rglob("*.py"):
+        room = path.relative_to(ROOT).parts
+        if room[0] in ("methods", "export") or room[:2] == ("evaluation", "papers"):
+            continue
+        named = classes_from(path, packages)
+        assert not named, f"{path.relative_to(ROOT)} imports {sorted(named)}: ask for a capability (methods/capabilities.py)"
+        text = path.read_text(encoding="utf-8")
+        found = re.search(r"\b(method|model|mouth|graph)\.name\s*[!=]=|isinstance\((method|model|mouth|graph), (?!str)", text)
+        assert not found, f"{path.relative_to(ROOT)}: {found and found[0]}: ask for a capability (methods/capabilities.py)"
+
+
+def test_the_command_line_holds_no_methods_name():
+    """A new method must not need a line there."""
+    names = re.compile(r"\b(" + "|".join(sorted(set(BUILT_IN) - {"emotion"})) + r")\b", re.IGNORECASE)
+    for path in (ROOT / "cli").rglob("*.py"):
+        found = names.search(path.read_text(encoding="utf-8"))
+        assert not found, f"cli/{path.name} names {found and found[0]}: let the method state it (methods/capabilities.py)"
+
+
+def test_loose_modules_stand_on_the_ground_floor():
+    """Every room may use them, so they may use none of the rooms above."""
+    for path in ROOT.glob("*.py"):
+        if path.name != "__init__.py":  # which offers what the rooms hold, lazily
+            above = {module[1] for module, _ in imports(path)} & set(BELOW) - {"inference"}
+            assert not above, f"{path.name} imports {sorted(above)}: it is below all rooms"
+
+
+@pytest.mark.parametrize(("folder", "rooms"), [("train", set(BELOW) - {"export"}), ("export", {"cli"})])
+def test_scripts_import_what_they_may(repository, folder, rooms):
+    """A training script shows the library, an export script is the verb for one method: neither has logic of the other's."""
+    scripts = list((repository / folder).glob("*.py"))
+    assert scripts
+    for path in scripts:
+        for module, names in imports(path):
+            known = module[1] in rooms or (folder == "train" and module[1] in ("config", "progress"))
+            assert known, f"{folder}/{path.name} imports {'.'.join(module)}"
+            assert not any(name.startswith("_") for name in names), f"{folder}/{path.name}: {names}"
+
+
+def test_importing_facesynth_imports_nothing_heavy_and_offers_everything():
+    code = "import sys, facesynth; print('torch' in sys.modules, 'numpy' in sys.modules); "
+    code += "[getattr(facesynth, name) for name in facesynth.__all__]; print(facesynth.list_methods()[0])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.split() == ["False", "False", "anime_graph"]
+    assert set(facesynth.__all__) == {"__version__", "load", "create", "list_methods", "Corpus", "Speech", "Motion", "speak"}
+    with pytest.raises(AttributeError, match="no attribute 'lode'"):
+        facesynth.lode  # noqa: B018 - that it is not there is what is tested
 
 
 def test_nothing_imports_gpl_packages():

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
-from facesynth.export.folder import Subject, write_folder
+from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.weights import Weights, stored_as
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import EmotionDetector
-from facesynth.methods.method import Method
 from facesynth.methods.model_file import read_header
-from facesynth.methods.registry import load
+from facesynth.methods.registry import known_capabilities, load
 
-_CONTENTS = {
-    "lds": "facesynth.export.lds:lds_content",
-    "efase": "facesynth.export.efase:efase_content",
-    "anime_graph": "facesynth.export.anime_graph:anime_graph_content",
-}
+
+@dataclass(frozen=True, eq=False)
+class Exportable:
+    """A trained model that can leave torch."""
+
+    subject: Subject
+    content: Callable[[], Content]
+    """Makes the graphs and the arrays."""
 
 
 def export_model(
@@ -28,22 +32,26 @@ def export_model(
 
     only: the one method that is wanted; a model of another is refused.
     """
-    model = open_model(path)
-    if only not in (None, model.name):
-        raise FacesynthError(f"{path} holds a model of method {model.name!r}; wanted {only}. `facesynth export` takes any")
-    if isinstance(model, EmotionDetector):
+    model = exportable(path)
+    if only not in (None, model.subject.method):
+        raise FacesynthError(
+            f"{path} holds a model of method {model.subject.method!r}; wanted {only}. `facesynth export` takes any"
+        )
+    return write_folder(folder, model.subject, stored_as(model.content(), weights))
+
+
+def exportable(path: str | Path) -> Exportable:
+    """The model in a file, a method with an exporter of its own or an emotion detector."""
+    if read_header(path)["method"] == EmotionDetector.name:
         from facesynth.export.emotion import emotion_content
 
-        subject = Subject(model.name, model.provenance, None, None, model.emotions)
-        return write_folder(folder, subject, stored_as(emotion_content(model), weights))
-    if model.name not in _CONTENTS:
-        raise FacesynthError(f"{path} holds a model of method {model.name!r}; wanted one of {', '.join(_CONTENTS)}, or emotion")
-    module, _, name = _CONTENTS[model.name].partition(":")
-    content = getattr(importlib.import_module(module), name)(model)
+        detector = EmotionDetector.load(path)
+        subject = Subject(detector.name, detector.provenance, None, None, detector.emotions)
+        return Exportable(subject, lambda: emotion_content(detector))
+    model = load(path)
+    exporter = model.capabilities.exporter
+    if not exporter:
+        having = [one.name for one in known_capabilities()[0] if one.exporter]
+        raise FacesynthError(f"{path} holds a model of method {model.name!r}; wanted one of {', '.join(having)}, or emotion")
     subject = Subject(model.name, model.provenance, model.fitted_layout.to_dict(), model.fps, model.emotions)
-    return write_folder(folder, subject, stored_as(content, weights))
-
-
-def open_model(path: str | Path) -> Method | EmotionDetector:
-    """A method or an emotion detector, whichever the file holds."""
-    return EmotionDetector.load(path) if read_header(path)["method"] == EmotionDetector.name else load(path)
+    return Exportable(subject, lambda: resolve_name(exporter)(model))

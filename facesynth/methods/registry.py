@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from facesynth.methods.method import Method
 
 GROUP = "facesynth.methods"
-_BUILT_IN = {
+BUILT_IN = {
     name: EntryPoint(name, f"facesynth.methods.{value}", GROUP)
     for name, value in {
         "mean_face": "baselines.capabilities:MEAN_FACE",
@@ -35,6 +35,7 @@ _BUILT_IN = {
         "efase": "efase.capabilities:CAPABILITIES",
     }.items()
 }
+"""Our own methods' entry points."""
 DEFAULT = "efase"
 """The method of those who do not choose one."""
 _CLASSES: dict[str, type[Method]] = {}
@@ -75,7 +76,7 @@ def capabilities_of(name: str) -> Capabilities:
 def known_capabilities() -> tuple[list[Capabilities], list[str]]:
     """Of all methods, in the order of what they need to learn from; and a line for each that cannot say."""
     known, broken = [], []
-    for name in [*_BUILT_IN, *(name for name in list_methods() if name not in _BUILT_IN)]:
+    for name in [*BUILT_IN, *(name for name in list_methods() if name not in BUILT_IN)]:
         try:
             known.append(capabilities_of(name))
         except FacesynthError as error:
@@ -153,12 +154,12 @@ def load(path: str | Path) -> Method:
 
 def _entries() -> Mapping[str, EntryPoint]:
     """Of other packages and our own; a name of ours cannot be taken over."""
-    return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **_BUILT_IN}
+    return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **BUILT_IN}
 
 
 def _of_package(entry: EntryPoint, import_it: Callable[[], A]) -> A:
     """What an import gives; whatever goes wrong in another package is told in one line and does not break the others."""
-    if entry.name in _BUILT_IN:
+    if entry.name in BUILT_IN:
         return import_it()
     try:
         return import_it()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from facesynth.corpus import Corpus, Record
-from facesynth.evaluation.lds_crossvalidation import Errors, cross_validate, table
+from facesynth.evaluation.papers.lds_crossvalidation import Errors, cross_validate, table
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
