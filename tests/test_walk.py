@@ -12,7 +12,7 @@ from facesynth.face.draw.video import read_video
 @pytest.mark.slow
 def test_the_walk_from_clips_to_video(recordings, landmark_models, rig, repository, tmp_path):
     command = [sys.executable, str(repository / "examples" / "walk.py"), str(recordings("grid_s26")), str(tmp_path / "w")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1800, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     for name in ("said.mp4", "said.csv", "said.glb", "said.npz", "said.TextGrid", "actor.safetensors"):
         assert (tmp_path / "w" / name).stat().st_size > 200
@@ -28,4 +28,5 @@ def test_the_walk_from_clips_to_video(recordings, landmark_models, rig, reposito
     assert len(beside.audio) / beside.sample_rate > 2.9
     from PIL import Image
 
-    assert Image.open(tmp_path / "w" / "plate.png").size == (1600, 640)
+    with Image.open(tmp_path / "w" / "plate.png") as plate:
+        assert plate.size == (1600, 640)

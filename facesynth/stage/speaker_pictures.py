@@ -17,7 +17,7 @@ from facesynth.methods.method import Method
 from facesynth.motion.planar import HeadMaps, is_tracked
 from facesynth.progress import track
 
-MOST_BYTES = 300_000_000
+LARGEST_PICTURES_BYTES = 300_000_000
 """Of all cut-out pictures together: three minutes of a face 130 pixels wide, some hundred pictures in full HD."""
 BACKGROUND_FRAMES = 250
 SHORT_FRAMES = 25
@@ -59,7 +59,7 @@ def speaker_of(corpus: Corpus) -> Speaker:
     chosen = [name for name, kept in zip(chosen, alike, strict=True) if kept]
     cuts = [cut for cut, kept in zip(cuts, alike, strict=True) if kept]
     behind = read_footage(videos[calm]).frames
-    behind = behind[: min(BACKGROUND_FRAMES, max(1, MOST_BYTES // behind[0].nbytes))]
+    behind = behind[: min(BACKGROUND_FRAMES, max(1, LARGEST_PICTURES_BYTES // behind[0].nbytes))]
     points, head = _joined([shapes[name] for name in chosen])
     background = shapes[calm].head.at(np.arange(len(behind)))
     return Speaker(
@@ -111,7 +111,7 @@ def _fitting(shapes: dict[str, Shapes], window: tuple[int, int, int, int]) -> li
     left, top, right, bottom = window
     total = sum(len(shape.points) for shape in shapes.values()) * (right - left) * (bottom - top) * 3
     names = list(shapes)
-    count = max(1, int(len(names) * min(1.0, MOST_BYTES / total)))
+    count = max(1, int(len(names) * min(1.0, LARGEST_PICTURES_BYTES / total)))
     return [names[place] for place in np.unique(np.linspace(0, len(names) - 1, count).round().astype(int))]
 
 

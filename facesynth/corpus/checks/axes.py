@@ -28,7 +28,7 @@ def axis_problems(file: str, middle: Floats, layout: Layout) -> Iterator[Problem
         rest = np.asarray(layout.neutral, np.float64).reshape(-1, layout.dimension)
         turn = _turn(middle, rest)
         if turn is not None:
-            yield Problem(file, _told(turn), f"{_mended(turn)}, and add the recording again")
+            yield Problem(file, _turn_text(turn), f"{_turn_remedy(turn)}, and add the recording again")
             return
         upside_down = _upside_down(rest, layout) and _upside_down(middle, layout)
     if upside_down:
@@ -55,7 +55,7 @@ def _signed_permutations(dimension: int) -> list[Floats]:
     return [np.diag(sign)[:, order] for order in orders for sign in signs]
 
 
-def _told(turn: Floats) -> str:
+def _turn_text(turn: Floats) -> str:
     flipped = [AXES[axis] for axis in range(len(turn)) if turn[axis, axis] < 0]
     if np.count_nonzero(np.diag(turn)) < len(turn):
         return f"its axes are exchanged: what the rest pose calls {', '.join(AXES[: len(turn)])} is its {_sources(turn)}"
@@ -63,7 +63,7 @@ def _told(turn: Floats) -> str:
     return f"against the rest pose its {' and '.join(flipped)} ax{'is is' if len(flipped) == 1 else 'es are'} flipped{mirrored}"
 
 
-def _mended(turn: Floats) -> str:
+def _turn_remedy(turn: Floats) -> str:
     return f"convert it with the axes {_sources(turn).replace(' ', '')}"
 
 
