@@ -8,7 +8,7 @@ from facesynth.export.graph import TOLERANCE, check_parity
 from facesynth.export.lds import lds_content
 from facesynth.export.models import export_model
 from facesynth.inference import FacesynthError, load
-from facesynth.inference.folder import digest, open_folder
+from facesynth.inference.folder import FORMAT, digest, open_folder
 from facesynth.methods.lds.method import LDS
 from facesynth.methods.registry import create
 
@@ -95,7 +95,7 @@ def test_a_changed_manifest_is_named(folder):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 1}, "format 1; this runtime reads 2"),
+        ({"format": FORMAT - 1}, f"format {FORMAT - 1}; this runtime reads {FORMAT}"),
         ({"method": "gan"}, "unknown method .* 'gan'"),
         ({"written_by": "somebody"}, "was not written by"),
         ({"files": {"../lds.py": {"bytes": 1, "sha256": ""}}}, "is not a file of this folder"),
