@@ -55,29 +55,30 @@ def _costs(wanted: Floats, features: Floats, starts: Ints, lengths: Ints) -> Flo
 
 # The least sum of distances on a monotone way from (0, 0) to (m - 1, L - 1) fills a table of m by L. A cell waits for the
 # cells above, beside and diagonally above it alone, so that all cells of one anti-diagonal, of all candidates, are one step.
+# Diagonal d is kept by its rows: its cell k is (k, d - k), and cells outside of the table are infinitely far.
 # Steps: 0 both advance, 1 only the input (the candidate holds), 2 only the candidate; of equal ones the first.
 def _matches(wanted: Floats, heard: Floats, lengths: Ints) -> tuple[Ints, Ints]:
     """First and last frame [m, n] of each candidate heard [n, L, P] that each frame of wanted is matched with."""
     m, (n, length) = len(wanted), heard.shape[:2]
-    apart = np.sqrt(np.square(wanted[:, None, None] - heard.transpose(1, 0, 2)).sum(axis=3))  # [m, L, n]
-    total = np.full((m + 1, length + 1, n), np.inf)
-    steps = np.zeros((m, length, n), np.uint8)
-    total[1, 1] = apart[0, 0]
-    for diagonal in range(1, m + length - 1):
-        k = np.arange(max(0, diagonal - length + 1), min(diagonal, m - 1) + 1)
-        f = diagonal - k
-        both, held, passed = total[k, f], total[k, f + 1], total[k + 1, f]
-        best, step = both, np.zeros(both.shape, np.uint8)
-        for cost, number in ((held, 1), (passed, 2)):
-            better = cost < best
-            best, step = np.where(better, cost, best), np.where(better, np.uint8(number), step)
-        total[k + 1, f + 1], steps[k, f] = best + apart[k, f], step
+    apart = np.full((m + length - 1, m, n), np.inf)
+    for k, frame in enumerate(wanted):
+        apart[k : k + length, k] = np.sqrt(np.square(heard - frame).sum(axis=2)).T
+    steps = np.empty((m + length - 1, m, n), np.uint8)
+    before, last = np.full((2, m + 1, n), np.inf)  # the two diagonals before; row k of the table is row k + 1 here
+    last[1] = apart[0, 0]
+    for d in range(1, m + length - 1):
+        both, held, passed = before[:-1], last[:-1], last[1:]
+        best = np.minimum(both, held)
+        np.minimum(best, passed, out=best)
+        steps[d] = np.where(both <= best, 0, np.where(held <= best, 1, 2))
+        before, last = last, before
+        np.add(best, apart[d], out=last[1:])
     return _traced(steps, lengths)
 
 
 def _traced(steps: NDArray[np.uint8], lengths: Ints) -> tuple[Ints, Ints]:
-    """All ways back from their ends together."""
-    m, _, n = steps.shape
+    """All ways back from their ends together; steps [diagonal, row, n]."""
+    _, m, n = steps.shape
     row, k, f = np.arange(n), np.full(n, m - 1), lengths - 1
     first, last = np.zeros((2, m, n), np.int64)
     last[k, row] = f
@@ -86,7 +87,7 @@ def _traced(steps: NDArray[np.uint8], lengths: Ints) -> tuple[Ints, Ints]:
         walking = np.flatnonzero((k > 0) | (f > 0))
         if not len(walking):
             return first, last
-        step = steps[k[walking], f[walking], walking]
+        step = steps[k[walking] + f[walking], k[walking], walking]
         k, f = k.copy(), f.copy()
         f[walking] -= step != 1
         up = walking[step != 2]
