@@ -108,7 +108,10 @@ class Method(nn.Module):
         return self.layout
 
     def learned_from(self, corpus: Corpus) -> None:
-        """Remember what every saved model states of its training data."""
+        """Remember what every saved model states of its training data; FacesynthError for a layout that it does not learn."""
+        kind, known = corpus.layout.kind, self.capabilities.layouts
+        if kind not in known:
+            raise FacesynthError(f"{self.name} learns {' or '.join(known)}; {corpus.path} holds {kind}")
         self.layout, self.fps, self.emotions = corpus.layout, corpus.fps, corpus.emotions
         self.provenance = corpus.provenance()
 

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from facesynth.atomic import write_text
+from facesynth.inference.errors import unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Accounting, Explaining
 from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, load, require
+from facesynth.methods.registry import ask, known_capabilities, load, require
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.hearing import Heard
 from facesynth.stage.cast import Cast, cast_for
@@ -140,6 +141,10 @@ def speak(model: str | Path, recording: str | Path, *outputs: str | Path, **aske
     """
     known = {field.name for field in fields(Request)} - {"own"}
     own = {name: value for name, value in asked.items() if name not in known}
+    options = {option.name for one in known_capabilities()[0] for option in one.options}
+    for name in own:
+        if name not in options:
+            raise unknown("option of speak", name, known | options)
     request = Request(own=own, **{name: value for name, value in asked.items() if name in known})
     targets = [check_output(path) for path in outputs]
     return produce(load(model), targets, request).say(Path(recording), targets, lambda _: None)
