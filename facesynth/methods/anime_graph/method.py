@@ -233,9 +233,9 @@ class AnimeGraph(Method):
             help_pairs=config["help_pairs"],
         )
 
-    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+    def synthesize(self, speech: Speech, *, seed: int = 0, look_ahead: int | None = None, **options: Any) -> Motion:
         """Motion for new speech; `look_ahead`, `to_emotion` and `to_intensity` as in `inference.anime_graph.model`."""
-        return self.runtime().synthesize(speech, seed=seed, **options)
+        return self.runtime().synthesize(speech, seed=seed, look_ahead=look_ahead, **options)
 
     def plan(self, speech: Speech, *, look_ahead: int | None = None) -> Plan:
         """The path through the graph that expresses speech."""
