@@ -3,10 +3,14 @@
     python benchmarks/efase_search.py [--corpus FOLDER]
 
 The weights are those of Deng 2006, PNT 10 times the median rule-2 transition; `--found` takes weights and PNT that
-`Efase` has by default.
-Without a corpus the database is generated: English phone sequences (words of CMUdict at random),
-each phone a target in 25 dimensions with falling variance, co-articulated by a Gaussian window and
-varied from node to node. Seed and PNT are printed. Times are ratios against the dense search in the same run.
+`Efase` has by default. With a corpus, nodes are those of its training sentences and what is asked for are the phones of
+sentences held out, one after the other. Without one the database is generated: English phone sequences (words of CMUdict
+at random), each phone a target in 25 dimensions with falling variance, co-articulated by a Gaussian window and
+varied from node to node. Seed and PNT are printed.
+
+Every engine is timed from nothing, and with what it prepares before the input is known kept; seconds of the processor on one
+thread, the best of three. The dense one has all N x N transitions in memory, made by matrix products, one batch for each
+length of a phone.
 """
 
 import argparse
@@ -18,16 +22,31 @@ import numpy as np
 import torch
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.methods.efase.costs import Query, Weights, path_cost
+from facesynth.inference.efase.bounds import step_bounds
+from facesynth.inference.efase.costs import Query, Weights, all_targets
+from facesynth.inference.efase.nodes import Nodes
+from facesynth.inference.efase.search import SearchIndex
+from facesynth.inference.efase.steps import path_cost
 from facesynth.methods.efase.dense import dense_search, transition_matrix
-from facesynth.methods.efase.nodes import MotionNodes
 from facesynth.methods.efase.penalty import median_transition
-from facesynth.methods.efase.search import build_index, search
 
 SEED = 0
-SIZES = (2000, 4000, 8000, 16000, 32000)
+SIZES = (1000, 2000, 4000, 8000, 16000)
 PAPER_2008_S = {14: 221, 24: 333, 53: 816, 63: 943}
 PAPER_2006_S = {14: 137.67, 24: 192.86, 33: 371.50, 63: 518.34}
+
+
+def by_numpy(nodes, weights):
+    return SearchIndex(nodes, weights, step_bounds(nodes, weights)).cheapest_path
+
+
+def by_matrix(nodes, weights):
+    transitions = transition_matrix(nodes, weights)
+    return lambda targets: dense_search(targets, transitions)
+
+
+ENGINES = {"dense": by_matrix, "numpy": by_numpy}
+"""Each prepares a database and returns what finds the cheapest path by target costs."""
 
 
 def english_phones(rng, count):
@@ -56,7 +75,7 @@ def generated_nodes(count, seed=SEED, width=25, emotions=4, sentence=30):
     frames = gaussian_filter1d(np.repeat(target * spread, lengths, axis=0), 4, axis=0)
     pieces = np.split(frames, np.cumsum(lengths)[:-1])
     before = np.where(np.arange(count) % sentence == 0, -1, np.arange(count) - 1)
-    return MotionNodes.from_pieces(pieces, phones, visemes, emotion, before)
+    return Nodes.from_pieces(pieces, phones, visemes, emotion, before)
 
 
 def generated_query(nodes, count, seed=SEED + 1):
@@ -65,12 +84,18 @@ def generated_query(nodes, count, seed=SEED + 1):
     return Query(phones, visemes, np.full(count, rng.integers(nodes.emotions.max() + 1)), {})
 
 
-def corpus_nodes(folder):
+def of_corpus(folder):
+    """Nodes of the training sentences, and a query of the phones of those held out."""
     from facesynth.corpus import Corpus
     from facesynth.methods.efase.method import Efase
 
-    model = Efase().fit(Corpus.open(folder))
-    return model.nodes()
+    train, test = Corpus.open(folder).split(SEED)
+    model = Efase().fit(train)
+    asked = [model.asked(utterance.speech)[0] for utterance in test]
+    columns = [np.concatenate([getattr(query, name) for query in asked]) for name in ("phones", "visemes", "emotions", "strict")]
+    said = columns[0] >= 0
+    phones, visemes, emotions, strict = (column[said] for column in columns)
+    return model.nodes(), Query(phones, visemes, emotions, {}, strict)
 
 
 def subsample(nodes, count, seed=SEED):
@@ -90,83 +115,87 @@ def weights_for(nodes, penalty, found):
 
 
 def timed(what, repeats=3):
+    """Least processor seconds, and the result."""
     times = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         result = what()
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return min(times), result
 
 
-def against_dense(nodes, query, weights):
-    matrix_s, matrix = timed(lambda: transition_matrix(nodes, weights), 1)
-    dense_s, dense = timed(lambda: dense_search(nodes, query, weights, matrix))
-    from_nothing_s, found = timed(lambda: search(build_index(nodes, weights), query))
-    index = build_index(nodes, weights)
-    prepared_s, _ = timed(lambda: search(index, query))
-    print(f"N = {len(nodes)}, T = {len(query)}, PNT = {weights.pnt:.4g}; share of phi computed {found.evaluated:.2%}")
-    print(f"  dense: transition matrix {matrix_s:.2f} s + blocked min-plus {dense_s:.2f} s")
-    tracemalloc.start()
-    search(build_index(nodes, weights), query)
-    peak_mb = tracemalloc.get_traced_memory()[1] / 1e6
-    tracemalloc.stop()
-    print(f"  most memory of (a): {peak_mb:.0f} MB; of the N x N matrix alone {len(nodes) ** 2 * 4 / 1e6:.0f} MB")
-    print(f"  (a) from nothing {from_nothing_s:.3f} s: {(matrix_s + dense_s) / from_nothing_s:.1f} x faster")
-    print(
-        f"  (b) tables kept, {index.bytes / 1e6:.1f} MB, {prepared_s:.3f} s: "
-        f"{dense_s / prepared_s:.1f} x faster than min-plus alone"
-    )
-    in_float64 = path_cost(nodes, query, dense.nodes, weights)
-    print(f"  cost {found.cost:.6g}, of the dense path {in_float64:.6g}, relative difference {in_float64 / found.cost - 1:.1e}")
+def compared(nodes, query, weights):
+    """Each engine from nothing and prepared, beside the dense one."""
+    print(f"N = {len(nodes)}, T = {len(query)}, PNT = {weights.pnt:.4g}")
+    targets, first = all_targets(nodes, query, weights), None
+    for name, prepare in ENGINES.items():
+        prepared_s, engine = timed(lambda prepare=prepare: prepare(nodes, weights), 2)
+        search_s, path = timed(lambda engine=engine: engine(targets))
+        total, cost = prepared_s + search_s, path_cost(nodes, query, path, weights)
+        first = first or (total, search_s, cost)
+        memory = most_mb(prepare, nodes, weights, targets)
+        print(f"  {name}: prepared in {prepared_s:.3f} s, searched in {search_s:.3f} s; most memory {memory:.0f} MB")
+        print(f"    {first[0] / total:.2f} x the dense one's speed from nothing, {first[1] / search_s:.2f} x when prepared")
+        print(f"    cost {cost:.8g}, relative difference from the dense path {cost / first[2] - 1:.1e}")
+    print(f"  the matrix of the dense one has {len(nodes) ** 2 * 4 / 1e6:.0f} MB, which the memory above leaves out")
     for year, seconds in (("2008", PAPER_2008_S), ("2006", PAPER_2006_S)):
         if len(query) in seconds:
             print(f"  the {year} paper on its machine, 5,556 nodes: {seconds[len(query)]} s")
 
 
-def growth(nodes_of, query_of, penalty, defaults):
-    seconds = []
-    sizes = []
+def most_mb(prepare, nodes, weights, targets):
+    """Of numpy's arrays, in preparation and search; torch's are not counted."""
+    tracemalloc.start()
+    prepare(nodes, weights)(targets)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def growth(nodes_of, query_of, penalty, found):
+    """Of the numpy search, prepared."""
+    sizes, seconds = [], []
     for size in SIZES:
         nodes = nodes_of(size)
         if sizes and len(nodes) < 1.5 * sizes[-1]:
             break
-        weights = weights_for(nodes, penalty, defaults)
-        query = query_of(nodes)
-        best, found = timed(lambda n=nodes, w=weights, q=query: search(build_index(n, w), q))
-        print(f"  N = {len(nodes):6d}: {best:.3f} s, phi computed {found.evaluated:.2%}", flush=True)
+        weights, query = weights_for(nodes, penalty, found), query_of(nodes)
+        engine, targets = by_numpy(nodes, weights), all_targets(nodes, query, weights)
+        best, _ = timed(lambda e=engine, t=targets: e(t))
+        print(f"  N = {len(nodes):6d}: {best:.3f} s", flush=True)
         sizes.append(len(nodes))
         seconds.append(best)
     if len(sizes) > 1:
-        exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
-        print(f"  time grows as N^{exponent:.2f}")
+        print(f"  time grows as N^{np.polyfit(np.log(sizes), np.log(seconds), 1)[0]:.2f}")
 
 
 def main():
     from facesynth.methods.efase.method import Efase
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--corpus", help="folder of a corpus to take the nodes from")
+    parser.add_argument("--corpus", help="folder of a corpus to take nodes and sentences from")
     parser.add_argument("--phones", type=int, default=63)
+    parser.add_argument("--nodes", type=int, default=5556, help="at most so many")
     parser.add_argument("--penalty", type=float, nargs="+", default=[10.0], help="PNT over the median rule-2 cost")
     parser.add_argument("--found", action="store_true", help="the default weights and PNT of Efase")
+    parser.add_argument("--growth", action="store_true", help="also how the time grows with N")
     options = parser.parse_args()
-    torch.manual_seed(SEED)
-    print(f"seed {SEED}; nodes {f'of {options.corpus}' if options.corpus else 'generated'}; phone sequences generated")
-    everything = corpus_nodes(options.corpus) if options.corpus else None
+    torch.set_num_threads(1)
+    print(f"seed {SEED}; nodes and phones {f'of {options.corpus}' if options.corpus else 'generated'}; one thread")
+    everything, said = of_corpus(options.corpus) if options.corpus else (None, None)
 
     def nodes_of(size):
         return generated_nodes(size) if everything is None else subsample(everything, size)
 
     def query_of(nodes):
-        return generated_query(nodes, options.phones)
+        return generated_query(nodes, options.phones) if said is None else said.part(np.arange(min(options.phones, len(said))))
 
-    search(build_index(generated_nodes(200), Weights(1.0)), generated_query(generated_nodes(200), 5))  # compile
     for penalty in [Efase().config["penalty"]] if options.found else options.penalty:
-        nodes = nodes_of(5556)
-        weights = weights_for(nodes, penalty, options.found)
-        against_dense(nodes, query_of(nodes), weights)
-        print(f"growth of (a), PNT = {penalty} x median:")
-        growth(nodes_of, query_of, penalty, options.found)
+        nodes = nodes_of(options.nodes)
+        compared(nodes, query_of(nodes), weights_for(nodes, penalty, options.found))
+        if options.growth:
+            print(f"growth of the numpy search, PNT = {penalty} x median:")
+            growth(nodes_of, query_of, penalty, options.found)
 
 
 if __name__ == "__main__":

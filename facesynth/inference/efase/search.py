@@ -9,7 +9,8 @@ phi_t(j) = min over i of [phi_t-1(i) + TC(i, j)] + target_t(j). Three passes fin
 * forwards again, phi is computed exactly for the nodes that are left. Predecessors are sorted by phi + the cost of the
   joint, by matrix products; the costly bending is computed from the front until nothing better can follow.
 
-What was computed once is kept: when a phone is added, only nodes that were left out before may have to be looked at.
+That is done every few phones, for bounds upon bounds grow loose. What was computed once is kept: when a phone is added, only
+nodes that were left out before may have to be looked at.
 `settle` fixes a node and forgets what lies before it, so that an input without an end costs the same at every phone.
 Bounds are compared with a margin for rounding; ties go to the node of the lowest number. numpy pays for each call: all is
 in batches.
@@ -28,9 +29,8 @@ from numpy.typing import NDArray
 from ..efase.bounds import StepBounds, class_order
 from ..efase.costs import Weights
 from ..efase.nodes import Floats, Ints, Nodes
-from ..efase.steps import end_vectors, start_vectors, step_costs
+from ..efase.steps import end_vectors, squared_distances, start_vectors, step_costs
 from ..errors import FacesynthError
-from ..products import product
 
 BEAM = 32
 """Nodes with real paths that are kept at each phone."""
@@ -44,6 +44,8 @@ MARGIN = 1e-5
 """Of upper bounds: tables and bounds are in single precision."""
 MANY = 300
 """Nodes a phone, on average, for which a better upper bound is worth looking for."""
+EVERY = 8
+"""Phones after which what may be on the best path so far is made exact: bounds upon bounds grow loose."""
 UNKNOWN, START = -2, -1
 """In place of a predecessor."""
 
@@ -116,6 +118,8 @@ class Search:
         here = Position(targets, phi, back)
         here.beam, here.upper = self._beam(here)
         self.positions.append(here)
+        if len(self) % EVERY == 0:
+            self._solve()
 
     def path(self) -> Ints:
         """[T] the nodes of the cheapest path to the newest phone."""
@@ -186,9 +190,7 @@ class Search:
     def _joints(self, i: Ints, j: Ints) -> Floats:
         """[m, n] cost of the joint from each i to each j, rounded down, and of another viseme class."""
         nodes = self.nodes
-        ends, joints = end_vectors(nodes, i, self.weights), start_vectors(nodes, j, self.weights)
-        total = np.square(joints).sum(axis=1)[:, None] + np.square(ends).sum(axis=1)
-        cost = np.maximum(total * (1 - ROUNDING) - 2 * product(joints, ends.T), 0.0)
+        cost = squared_distances(start_vectors(nodes, j, self.weights), end_vectors(nodes, i, self.weights), ROUNDING)
         cost += np.where(nodes.visemes[nodes.before[j]][:, None] == nodes.visemes[i], 0.0, self.weights.pnt)
         return cost
 
@@ -258,15 +260,16 @@ class Search:
         lowest[np.flatnonzero(before >= 0), before[before >= 0]] = np.inf
         rows = np.arange(len(j))
         self._try(rows, lowest.argmin(axis=1), lowest, i, phi, j, best, origin)
-        while True:
-            row, column = np.nonzero(lowest <= np.minimum(best, limit)[:, None])
-            if not len(row):
-                return best, origin
-            order = np.lexsort((lowest[row, column], row))
-            row, column = row[order], column[order]
-            rank = np.arange(len(row)) - np.searchsorted(row, row)
-            now = rank < CHUNK
+        row, column = np.nonzero(lowest <= np.minimum(best, limit)[:, None])
+        order = np.lexsort((lowest[row, column], row))
+        row, column = row[order], column[order]
+        rank = np.arange(len(row)) - np.searchsorted(row, row)  # the nearest predecessor of each row first, then the next ones
+        for start in range(0, int(rank.max(initial=-1)) + 1, CHUNK):
+            left = lowest[row, column] <= np.minimum(best, limit)[row]
+            row, column, rank = row[left], column[left], rank[left]
+            now = rank < start + CHUNK
             self._try(row[now], column[now], lowest, i, phi, j, best, origin)
+        return best, origin
 
     def _try(self, row: Ints, column: Ints, lowest: Floats, i: Ints, phi: Floats, j: Ints, best: Floats, origin: Ints) -> None:
         """Compute the pairs (i[column], j[row]) exactly, and take them off `lowest`."""

@@ -155,7 +155,7 @@ def bends(nodes: Nodes, before: Ints, previous: Ints) -> Floats:
     return cost
 
 
-def squared_distances(a: Floats, b: Floats) -> Floats:
-    """[n, m] ‖a - b‖² of rows a [n, k] and b [m, k]."""
-    squared = np.square(a).sum(axis=1)[:, None] + np.square(b).sum(axis=1) - 2 * product(a, b.T)
-    return np.asarray(np.maximum(squared, 0.0))
+def squared_distances(a: Floats, b: Floats, lowered: float = 0.0) -> Floats:
+    """[n, m] ‖a - b‖² of rows a [n, k] and b [m, k]; lowered by a share of ‖a‖² + ‖b‖², which makes it a bound."""
+    total = np.square(a).sum(axis=1)[:, None] + np.square(b).sum(axis=1)
+    return np.asarray(np.maximum(total * (1 - lowered) - 2 * product(a, b.T), 0.0))
