@@ -62,7 +62,7 @@ def anime_graph_content(model: AnimeGraph) -> Content:
             "look_ahead_s": None,
             "look_ahead_phones": 4,
             "phones_after": 2,
-            "guard_s": (model.runtime().low_pass.settles_frames + 4) / model.fps + 2 * LONGEST_CLOSING_S,
+            "guard_s": (model.runtime().low_pass.settles_frames + 5) / model.fps + 2 * LONGEST_CLOSING_S,
             "about": "synthesize searches the whole utterance, or look_ahead=n phones; a stream looks n ahead (4 unless told). A "
             "frame is final when n + phones_after more phones are known and guard_s of motion, as far as the low-pass filter and "
             "closing lips reach; near a p, b or m the length of that phone more",

@@ -36,7 +36,7 @@ REMEMBERED_S = 1.0
 OPTIONS = ("seed", "look_ahead", "to_emotion", "to_intensity")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AnimeGraph:
     """Everything that a trained graph speaks with; its parts are graphs of an exported folder, or modules of torch."""
 
