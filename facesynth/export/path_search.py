@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.motion.search.cheapest import cheapest
+from facesynth.motion.search.steps import GivenSteps
 
 CANDIDATES = 7
 """In comparisons; any number may come."""
@@ -72,7 +75,6 @@ def _example(batch: int, length: int, rng: np.random.Generator) -> dict[str, NDA
 
 
 def _reference(arrays: Arrays) -> list[NDArray[Any]]:
-    from facesynth.motion.paths import cheapest_path
-
-    found = [cheapest_path(t, s) for t, s in zip(arrays["targets"], arrays["steps"], strict=True)]
-    return [np.stack([path for path, _ in found]), np.array([cost for _, cost in found])]
+    targets, steps = (torch.from_numpy(arrays[name]).unbind(dim=1) for name in ("targets", "steps"))
+    found = cheapest(targets, GivenSteps(steps))
+    return [found.path.numpy(), found.cost.numpy()]

@@ -12,7 +12,6 @@ from facesynth.export.parts import export_features
 from facesynth.export.path_search import path_search_graph
 from facesynth.export.speech_graphs import rasta_plp_stream_graph
 from facesynth.inference import FacesynthError, load
-from facesynth.motion.paths import cheapest_path
 from facesynth.speech.rasta_plp import RastaPlp
 
 SCRIPTS = Path(__file__).parents[2] / "export"
@@ -114,15 +113,3 @@ def test_what_is_heard_in_pieces_is_compared_from_a_state_too():
     assert {float(inputs["fresh"]) for inputs in drawn} == {0.0, 1.0}
     assert all(np.abs(inputs["history"]).min() > 0 and np.abs(inputs["level"]).min() > 0 for inputs in drawn)
     assert check_parity(graph).relative < TOLERANCE
-
-
-def test_the_cheapest_path_is_the_cheapest_of_all():
-    rng = np.random.default_rng(1)
-    targets, steps = rng.random((4, 3)), rng.random((3, 3, 3))
-    costs = {
-        path: sum(targets[t, k] for t, k in enumerate(path)) + sum(steps[t, path[t + 1], path[t]] for t in range(3))
-        for path in product(range(3), repeat=4)
-    }
-    path, cost = cheapest_path(targets, steps)
-    assert tuple(path.tolist()) == min(costs, key=costs.get)
-    assert cost == pytest.approx(min(costs.values()))

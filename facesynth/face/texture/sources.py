@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.search.cheapest import cheapest
+from facesynth.motion.search.pictures import PictureSteps
 
 CANDIDATES = 48
 """Nearest training shapes that are considered for each frame."""
@@ -28,7 +31,7 @@ def coherent(
     """[T] training pictures near the targets whose sequence does not flicker.
 
     The least sum of (mean squared distance of shapes) + `jump_weight` times (mean squared difference of looks, in units of the
-    median difference between recorded neighbours) over all sequences of candidates, by min-plus path search. Staying on
+    median difference between recorded neighbours) over all sequences of candidates, as `PictureSteps` has it. Staying on
     a picture, or going on to the one recorded after it, costs nothing.
 
     targets [T, K, 2] and shapes [N, K, 2] px; looks [N, Q] what the mouth looks like; clip_starts [N] marks the first
@@ -39,29 +42,9 @@ def coherent(
     unary = distance**2 / targets.shape[1]
     natural = np.median(_squared(looks[1:], looks[:-1])[~clip_starts[1:]]) if len(looks) > 1 else 1.0
     scale = jump_weight * np.median(unary[:, 0]) / max(natural, np.finfo(float).tiny)
-    best, back = unary[0], np.zeros(index.shape, np.int64)
-    for t in range(1, len(index)):
-        step = best[None] + scale * _jump(index[t - 1], index[t], looks, clip_starts)
-        back[t] = step.argmin(axis=1)
-        best = step.min(axis=1) + unary[t]
-    return _traced(index, back, int(best.argmin()))
-
-
-def _jump(
-    before: NDArray[np.int64], after: NDArray[np.int64], looks: NDArray[np.float64], clip_starts: NDArray[np.bool_]
-) -> NDArray:
-    """[after, before] squared difference of looks, 0 where nothing is jumped over."""
-    same = after[:, None] == before
-    following = (after[:, None] == before + 1) & ~clip_starts[after][:, None]
-    return np.where(same | following, 0.0, _squared(looks[after][:, None], looks[before][None]))
-
-
-def _traced(index: NDArray[np.int64], back: NDArray[np.int64], last: int) -> NDArray[np.int64]:
-    chosen = np.empty(len(index), np.int64)
-    for t in range(len(index) - 1, -1, -1):
-        chosen[t] = index[t, last]
-        last = back[t, last]
-    return chosen
+    steps = PictureSteps(torch.from_numpy(looks), torch.from_numpy(clip_starts), torch.from_numpy(index), scale)
+    path = cheapest([target[None] for target in torch.from_numpy(unary)], steps).path[0].numpy()
+    return np.take_along_axis(index, path[:, None], axis=1)[:, 0].astype(np.int64)
 
 
 def _squared(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
