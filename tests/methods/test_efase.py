@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from corpora import tiny_corpus
 from literal_search import literal
 from safetensors import safe_open
@@ -22,8 +21,8 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.efase.constraints import read_constraints
-from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.torch_search import torch_engine
 from facesynth.methods.registry import create, load
 
 
@@ -232,17 +231,12 @@ def test_pauses_part_the_search_unless_they_are_bridged(model, speech):
     assert (bridged.nodes >= 0).all()
 
 
-def test_dense_search_on_a_torch_device_finds_the_same_path(model, speech):
+def test_the_search_by_tensors_finds_the_same_path(model, speech):
     nodes, weights = model.nodes(), model.weights()
     query = model.plan(speech).query
-    transitions = transition_matrix(nodes, weights, "cpu", torch.float64)
     assert (query.phones < 0).any()  # silence is a step here
     targets = all_targets(nodes, query, weights)
-    costs = [
-        path_cost(nodes, query, path, weights)
-        for path in (dense_search(targets, transitions), model.speaker.index.cheapest_path(targets))
-    ]
-    np.testing.assert_allclose(costs[0], costs[1], rtol=1e-9)
+    np.testing.assert_array_equal(torch_engine(nodes, weights)(targets), model.speaker.index.cheapest_path(targets))
 
 
 def test_equals_the_literal_algorithm_on_a_recorded_database(model, halves):

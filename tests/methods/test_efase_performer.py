@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-import torch
 
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
 from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
 from facesynth.inference.efase.costs import all_targets
-from facesynth.inference.efase.steps import path_cost
-from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.torch_search import torch_engine
 
 pytestmark = pytest.mark.slow
 
@@ -29,15 +27,13 @@ def spoken(model, halves):
     return [(utterance, model.synthesize(utterance.speech)) for utterance in halves[1]]
 
 
-def test_the_path_is_the_optimum_of_the_dense_matrix(model, halves):
+def test_both_engines_find_the_optimum(model, halves):
     nodes, weights = model.nodes(), model.weights()
-    transitions = transition_matrix(nodes, weights, "cpu", torch.float64)
+    by_tensors = torch_engine(nodes, weights)
     for utterance in list(halves[1])[:4]:
         query = model.plan(utterance.speech).query
         targets = all_targets(nodes, query, weights)
-        paths = dense_search(targets, transitions), model.speaker.index.cheapest_path(targets)
-        dense, sparse = (path_cost(nodes, query, path, weights) for path in paths)
-        np.testing.assert_allclose(sparse, dense, rtol=1e-7)
+        np.testing.assert_array_equal(by_tensors(targets), model.speaker.index.cheapest_path(targets))
 
 
 def test_the_asked_emotion_is_recognised_in_what_is_said(halves, spoken):

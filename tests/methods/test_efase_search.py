@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from literal_search import literal, path_cost, target_costs, transition_cost
 
 from facesynth.inference.efase import steps
@@ -12,7 +11,7 @@ from facesynth.inference.efase.bounds import step_bounds
 from facesynth.inference.efase.costs import Query, Weights, all_targets
 from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.search import SearchIndex
-from facesynth.methods.efase.dense import dense_search, transition_matrix
+from facesynth.methods.efase.torch_search import torch_engine
 
 
 def random_nodes(rng, count=40, phones=5, emotions=2, width=3, scale=1.0, sentence=6, shortest=1):
@@ -35,13 +34,8 @@ def by_numpy(nodes, weights):
     return SearchIndex(nodes, weights, step_bounds(nodes, weights)).cheapest_path
 
 
-def by_matrix(nodes, weights):
-    transitions = transition_matrix(nodes, weights, "cpu", torch.float64)
-    return lambda targets: dense_search(targets, transitions)
-
-
-ENGINES = {"numpy": by_numpy, "matrix": by_matrix}
-"""Each finds what the literal algorithm finds; the path itself where it computes each pair by itself."""
+ENGINES = {"numpy": by_numpy, "torch": torch_engine}
+"""Each finds what the literal algorithm finds."""
 
 
 def search(nodes, query, weights, engine="numpy"):
@@ -63,8 +57,7 @@ def test_equals_the_literal_algorithm_on_random_databases(pnt, fixed, engine):
         found, nodes_found = search(nodes, query, weights, engine)
         np.testing.assert_allclose(found, cost, rtol=1e-9)
         np.testing.assert_allclose(path_cost(nodes, query, nodes_found, weights), cost, rtol=1e-9)
-        if engine == "numpy":
-            np.testing.assert_array_equal(nodes_found, path)
+        np.testing.assert_array_equal(nodes_found, path)
         for t, node in query.fixed.items():
             assert nodes_found[t] == node
 

@@ -29,8 +29,8 @@ from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.audio import AudioTerms
 from facesynth.methods.efase.capabilities import CAPABILITIES
 from facesynth.methods.efase.database import build_database
-from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.penalty import median_transition
+from facesynth.methods.efase.torch_search import torch_engine
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
@@ -280,12 +280,9 @@ class Efase(Method):
             self.register_buffer(name, torch.from_numpy(table).to(self.node_frames.device))
 
     def _engine(self) -> Engine | None:
-        """On another device than the processor, the search by dense matrix products there."""
+        """On another device than the processor, the search by tensors there."""
         device = self.node_frames.device
-        if device.type == "cpu":
-            return None
-        transitions = transition_matrix(self.nodes(), self.weights(), str(device))
-        return lambda targets: dense_search(targets, transitions)
+        return None if device.type == "cpu" else torch_engine(self.nodes(), self.weights(), device)
 
     def _decode(self, coordinates: NDArray[np.float32]) -> NDArray[np.float32]:
         frames: NDArray[np.float32] = self.pca.decode(torch.from_numpy(coordinates).to(self.pca.mean.device)).cpu().numpy()
