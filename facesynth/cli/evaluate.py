@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 @click.option("--workers", default=1, show_default=True, help="Processes at once; each keeps to one thread.")
 @click.option("--engine", default="processes", show_default=True, help="processes, or ray.")
 @click.option("--address", default="", help="Of a Ray cluster whose machines see the same files.")
+@click.option("--device", default="cpu", show_default=True, help="Where methods learn and speak: cpu, cuda, mps or auto.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
@@ -58,6 +59,7 @@ def evaluate(
     workers: int,
     engine: Engine,
     address: str,
+    device: str,
     seed: int,
     as_json: bool,
 ) -> None:
@@ -68,6 +70,7 @@ def evaluate(
     """
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
+    from facesynth.device import device_of
     from facesynth.evaluation.folds import make_folds, read_folds
     from facesynth.evaluation.report import Wish, require_drawing, write_report
 
@@ -75,6 +78,7 @@ def evaluate(
         _refuse_training()
     team = Workers(workers, engine, address)
     require_drawing()
+    device_of(device)
     recordings = Corpus.open(corpus)
     for utterance_id in shown:
         recordings.record(utterance_id)
@@ -84,7 +88,7 @@ def evaluate(
         if not methods and not families:
             raise click.UsageError("name a method, a --family or --from-predictions")
         splits = splits or make_folds(recordings, folds, seed, test_limit=test_limit, train_minutes=train_minutes)
-    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=team)
+    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=team, device=device)
     page = write_report(output, result, recordings, known, Wish(title or recordings.performer, shown, videos=not no_video))
     if as_json:
         click.echo(result.comparison.json())
@@ -124,12 +128,13 @@ def _result(
     *,
     seed: int,
     workers: Workers,
+    device: str,
 ) -> Evaluation:
     from facesynth.evaluation.compare import evaluate as compare
     from facesynth.evaluation.compare import folds_beside, judge_predictions, predicted_labels
 
     if stored is None:
         assert splits is not None  # noqa: S101 - told apart by the caller
-        return compare(contestants, corpus, splits, output, seed=seed, workers=workers)
+        return compare(contestants, corpus, splits, output, seed=seed, workers=workers, device=device)
     labels = predicted_labels(stored, families)
     return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, labels, seed=seed, workers=workers)

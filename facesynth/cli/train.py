@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @click.option(
     "--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Which sentences to learn from."
 )
+@click.option("--device", help="auto (the default), cpu, cuda or mps; `device` of --config otherwise.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="METHOD emotion: voices at once.")
 @click.option("--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works.")
@@ -37,6 +38,7 @@ def train(
     output: Path | None,
     config: Path | None,
     split: str,
+    device: str | None,
     seed: int,
     as_json: bool,
     **who: Any,
@@ -50,11 +52,14 @@ def train(
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
+    from facesynth.device import device_of
     from facesynth.methods.registry import method_class
     from facesynth.methods.training import train as learn
     from facesynth.stage.speaker_pictures import save_face
 
     chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
+    configured = chosen.pop("device", "auto")
+    place = device_of(device or str(configured))
     if method == "emotion":
         from facesynth.cli.emotion import train_detector
 
@@ -69,7 +74,7 @@ def train(
     if split == "train":
         recordings, _ = recordings.split(seed)
     start = time.perf_counter()
-    model = learn(wanted, recordings, chosen, seed=seed)
+    model = learn(wanted, recordings, chosen, seed=seed, device=place)
     seconds = time.perf_counter() - start
     path = output or Path(f"{method}.safetensors")
     model.save(path)

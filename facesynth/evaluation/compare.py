@@ -91,6 +91,7 @@ def evaluate(
     *,
     seed: int = 0,
     workers: Workers = ALONE,
+    device: str = "cpu",
 ) -> Evaluation:
     """Train every contestant on every fold, let it speak the tested sentences, and judge what it made by the recordings.
 
@@ -101,7 +102,11 @@ def evaluate(
     folder = Path(folder)
     write_folds(folder / FOLDS, corpus, folds)
     predictions = folder / PREDICTIONS
-    jobs = [Job(corpus.path, predictions, one, fold, number, seed) for number, fold in enumerate(folds, 1) for one in contestants]
+    jobs = [
+        Job(corpus.path, predictions, one, fold, number, seed, device)
+        for number, fold in enumerate(folds, 1)
+        for one in contestants
+    ]
     with _alone_in(folder):
         for _ in spread(run_job, jobs, workers, "training and speaking"):
             pass

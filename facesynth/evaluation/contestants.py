@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import torch
 import yaml
 
 from facesynth.config import load_config
@@ -15,7 +16,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
 from facesynth.methods.registry import create, known_capabilities, method_class
-from facesynth.methods.training import train
+from facesynth.methods.training import CPU, train
 
 SECOND_TAKE = "second take"
 """The label of the row that is a recording."""
@@ -46,9 +47,9 @@ class Contestant:
         """The method, untrained; unknown settings are answered with the nearest known one."""
         return create(self.method, **self.settings)
 
-    def train(self, corpus: Corpus, seed: int) -> Method:
-        """The method, trained."""
-        return train(method_class(self.method), corpus, self.settings, seed=seed)
+    def train(self, corpus: Corpus, seed: int, device: torch.device = CPU) -> Method:
+        """The method, trained on a device."""
+        return train(method_class(self.method), corpus, self.settings, seed=seed, device=device)
 
     def plain(self) -> dict[str, Any]:
         """Everything that decides what it makes, as JSON values; settings left out are the method's defaults."""
@@ -86,7 +87,9 @@ def contestant(spec: str) -> Contestant:
     """`efase`, or `efase:settings.yaml` under the name of the file."""
     name, _, config = spec.partition(":")
     method_class(name)
-    one = Contestant(Path(config).stem if config else name, name, load_config(config) if config else {})
+    settings = load_config(config) if config else {}
+    settings.pop("device", None)  # of a comparison, all rows are made on one device
+    one = Contestant(Path(config).stem if config else name, name, settings)
     one.create()
     return one
 

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from facesynth.atomic import write_text
 from facesynth.corpus import Corpus, Utterance
+from facesynth.device import device_of
 from facesynth.evaluation.contestants import Contestant
 from facesynth.evaluation.cost import MB, peak_speaking_mb, stopwatch
 from facesynth.evaluation.folds import Fold, minutes_of, some_minutes, some_of
@@ -55,6 +56,8 @@ class Job:
     number: int
     """Of the fold, from 1."""
     seed: int
+    device: str = "cpu"
+    """Where it learns and speaks; see `facesynth.device.DEVICES`."""
 
     @property
     def folder(self) -> Path:
@@ -113,7 +116,7 @@ def _run(job: Job, corpus: Corpus) -> None:
     if not job.model.is_file():
         account |= _train(job, corpus)
         _write(job.account, account)
-    method = load(job.model)
+    method = load(job.model).to(device_of(job.device))
     _speak(job, corpus, method)
     _sample(job, corpus, method)
     _write(job.account, account | {"peak_mb": _peak_mb(job, corpus), "done": True})
@@ -124,7 +127,7 @@ def _train(job: Job, corpus: Corpus) -> dict[str, Any]:
     learned = job.learned(corpus)
     _warm_up(job, corpus.subset(learned[:WARM_UTTERANCES]))
     with stopwatch() as spent:
-        method = job.contestant.train(corpus.subset(learned), job.seed)
+        method = job.contestant.train(corpus.subset(learned), job.seed, device_of(job.device))
     method.save(job.model)
     return {
         "train_s": spent.clock_s,

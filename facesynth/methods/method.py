@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Self, get_type_hints
 
+import torch
 from torch import nn
 
 from facesynth.corpus import Corpus
@@ -99,6 +100,11 @@ class Method(nn.Module):
         A method adds options of its own as keywords.
         """
         raise NotImplementedError
+
+    @property
+    def device(self) -> torch.device:
+        """Where its tensors are, and where `fit` leaves what it learns."""
+        return next(iter(self.state_dict(keep_vars=True).values())).device
 
     @property
     def fitted_layout(self) -> Layout:

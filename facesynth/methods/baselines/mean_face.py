@@ -31,7 +31,7 @@ class MeanFace(Method):
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Take the mean of what was recorded."""
         self.learned_from(corpus)
-        self.mean = torch.from_numpy(mean_pose(corpus).astype(np.float32))
+        self.mean = torch.from_numpy(mean_pose(corpus).astype(np.float32)).to(self.device)
         return self.eval()
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:

@@ -51,8 +51,8 @@ class PhoneMean(Method):
         sums = _pose_sums(corpus)
         together = {phone: total.mean(mean) for (emotion, phone), total in sums.items() if emotion == ANY}
         rows = sorted(sums)
-        self.mean = torch.from_numpy(mean.astype(np.float32))
-        self.poses = torch.from_numpy(np.array([sums[row].mean(together[row[1]]) for row in rows], np.float32))
+        poses = np.array([sums[row].mean(together[row[1]]) for row in rows], np.float32)
+        self.mean, self.poses = (torch.from_numpy(a).to(self.device) for a in (mean.astype(np.float32), poses))
         self.facts = {"rows": [list(row) for row in rows]}
         return self.eval()
 

@@ -54,14 +54,14 @@ class Ridge(Method):
         """Learn from the complete frames of a corpus; FacesynthError where it has a single sentence."""
         self.learned_from(corpus)
         held_out = _held_out(corpus, seed)
-        self.pca = Pca.fit(complete_frames(corpus), self.components)
+        self.pca = Pca.fit(complete_frames(corpus), self.components).to(self.device)
         self.hearing.learn(corpus)
         parts = self._moments(corpus, held_out)
         together = parts[0] + parts[1]
         errors = [parts[1].error(*weights) for weights in parts[0].solutions(ALPHAS)]
         best = int(np.argmin(errors))
         weights, bias = together.solutions(ALPHAS)[best]
-        self.weights, self.bias = torch.from_numpy(weights).float(), torch.from_numpy(bias).float()
+        self.weights, self.bias = (torch.from_numpy(a).float().to(self.device) for a in (weights, bias))
         self.facts = {"alpha": float(ALPHAS[best]), "held_out_rms": float(np.sqrt(errors[best]))}
         return self.eval()
 
@@ -84,8 +84,8 @@ class Ridge(Method):
         for utterance in track(corpus, "ridge: listening", len(corpus)):
             present = complete(utterance.motion.frames)
             heard = self._heard(utterance.speech, len(utterance.motion))[present]
-            moved = self.pca.encode(torch.from_numpy(utterance.motion.frames[present]))
-            parts[utterance.sentence in held_out].add(heard.numpy(), moved.numpy())
+            moved = self.pca.encode(torch.from_numpy(utterance.motion.frames[present]).to(self.device))
+            parts[utterance.sentence in held_out].add(heard.cpu().numpy(), moved.cpu().numpy())
         return parts
 
 

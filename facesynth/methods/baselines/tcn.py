@@ -47,11 +47,11 @@ class Tcn(Method):
         """Learn from the complete frames of a corpus."""
         self.learned_from(corpus)
         frames = complete_frames(corpus)
-        self.pca = Pca.fit(frames, self.components)
+        self.pca = Pca.fit(frames, self.components).to(self.device)
         self.hearing.learn(corpus)
-        self.scale = self.pca.encode(torch.from_numpy(frames)).std(dim=0).max().clamp(min=1e-6).reshape(1)
+        self.scale = self.pca.encode(torch.from_numpy(frames).to(self.device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
         tracks = [self._tracks(utterance) for utterance in corpus]
-        self.network = network(self.hearing.mel.bands, self.pca.basis.shape[1], seed)
+        self.network = network(self.hearing.mel.bands, self.pca.basis.shape[1], seed).to(self.device)
         self.facts = {"loss": train(self.network, tracks, self.steps, seed, "tcn: learning")}
         return self.eval()
 
@@ -72,13 +72,13 @@ class Tcn(Method):
         present = complete(motion.frames)
         times_s = np.arange(int(motion.duration_s * RATE) + 1) / RATE
         nearest = np.minimum(np.round(times_s * motion.fps).astype(np.int64), len(motion) - 1)
+        heard = self.hearing.at(utterance.speech, times_s)
         if not present.any():
-            empty = torch.zeros(len(times_s), self.pca.basis.shape[1])
-            return Tracks(self.hearing.at(utterance.speech, times_s), empty, torch.zeros(len(times_s)))
-        known = self.pca.encode(torch.from_numpy(motion.frames[present])).numpy() / self.scale.numpy()
+            return Tracks(heard, heard.new_zeros(len(times_s), self.pca.basis.shape[1]), heard.new_zeros(len(times_s)))
+        known = (self.pca.encode(torch.from_numpy(motion.frames[present]).to(self.device)) / self.scale).cpu().numpy()
         moved = [np.interp(times_s, motion.times_s[present], column) for column in known.T]
         return Tracks(
-            self.hearing.at(utterance.speech, times_s),
-            torch.from_numpy(np.stack(moved, axis=1)).float(),
-            torch.from_numpy(present[nearest]).float(),
+            heard,
+            torch.from_numpy(np.stack(moved, axis=1)).to(heard),
+            torch.from_numpy(present[nearest]).to(heard),
         )

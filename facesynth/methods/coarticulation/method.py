@@ -133,8 +133,9 @@ class Coarticulation(Method):
     def _keep(self, rest: Floats, basis: Floats, keys: KeyShapes, models: WeightModels) -> None:
         arrays = {"rest": rest, "basis": basis}
         arrays |= {name: getattr(keys, name) for name in KEY_FIELDS} | {name: getattr(models, name) for name in MODEL_FIELDS}
+        device = self.device
         for name, array in arrays.items():
-            self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)))
+            self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)).to(device))
 
     def _track(self, utterance: Utterance, rest: Floats, basis: Floats) -> Track:
         frames = (utterance.motion.frames.astype(np.float64) - rest) @ basis

@@ -56,7 +56,8 @@ class PhoneSound(nn.Module):
 
     def rescale(self, factors: Tensor) -> None:
         """Let the squared difference of each component [A] count by a factor."""
-        self.size, self.nodes = self.size / factors.sqrt(), self.nodes * factors.sqrt()
+        root = factors.sqrt().to(self.size)
+        self.size, self.nodes = self.size / root, self.nodes * root
 
     def sounds(self) -> PhoneSounds:
         """What the search takes of it."""
@@ -84,7 +85,7 @@ class AudioTerms(nn.Module):
         if self.sound is not None:
             self.sound.rescale(torch.tensor(sound, dtype=torch.float32))
         if self.predictor is not None:
-            self.predictor.metric = torch.tensor(pose, dtype=torch.float32)
+            self.predictor.metric = torch.tensor(pose, dtype=torch.float32, device=self.predictor.metric.device)
 
     @property
     def empty(self) -> bool:

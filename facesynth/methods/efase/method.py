@@ -129,10 +129,11 @@ class Efase(Method):
         """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
         if self.config["learn"]:
             raise FacesynthError("learn=true is learned before fit; train with facesynth.methods.training.train")
+        device = self.device
         self.learned_from(corpus)
         database = build_database(corpus, self.config["database_fps"], self.config["components"])
         nodes = database.nodes
-        self.pca = database.pca
+        self.pca = database.pca.to(device)
         self.facts = {"names": list(database.names), "unusable_phones": database.unusable, "barren": list(database.barren)}
         self.register_buffer("node_frames", torch.from_numpy(nodes.frames.astype(np.float32)))
         self.register_buffer("node_table", torch.from_numpy(np.stack([getattr(nodes, column) for column in COLUMNS])))
@@ -140,7 +141,7 @@ class Efase(Method):
         self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
         self.audio.learn(corpus, self.pca, database.names, nodes.phones, seed)
         self._keep_bounds()
-        return self
+        return self.to(device)
 
     @classmethod
     def load(cls, path: Any) -> Self:

@@ -77,6 +77,7 @@ class LDS(Method):
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from a corpus of any layout; `facts` holds what was chosen, the errors and the poles."""
+        device = self.device
         self.learned_from(corpus)
         pieces, left_out = pieces_of(corpus)
         self.shape = Standardised.fit([piece.frames for piece in pieces], self.config["components"], "the motion")
@@ -101,7 +102,7 @@ class LDS(Method):
             "stochastic_order": plain(orders[1]),
             "no_change_error": orders[2],
         }
-        return self
+        return self.to(device)
 
     def synthesize(self, speech: Speech, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
         """Motion for new speech, of which only the sound counts: this model knows neither phones nor emotions.

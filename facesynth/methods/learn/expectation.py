@@ -45,9 +45,9 @@ class PosePredictor(nn.Module):
         tracks = [self._tracks(utterance, corpus.emotions, encode) for utterance in corpus]
         everything = torch.cat([t.moved[t.present > 0] for t in tracks])
         self.scale = everything.std(dim=0).max().clamp(min=1e-6).reshape(1)
-        self.metric = torch.ones(everything.shape[1])
+        self.metric = everything.new_ones(everything.shape[1])
         tracks = [t._replace(moved=t.moved / self.scale) for t in tracks]
-        self.network = network(tracks[0].heard.shape[1], everything.shape[1], seed)
+        self.network = network(tracks[0].heard.shape[1], everything.shape[1], seed).to(self.scale.device)
         train(self.network, tracks, STEPS, seed, "learning what is expected")
         self.eval()
 
@@ -74,6 +74,8 @@ class PosePredictor(nn.Module):
         told: NDArray[np.float32] = heard(
             bands, said, speech.phones.ends_s, felt, times_s, self.hearing.standard(), len(emotions)
         )
-        present = torch.from_numpy(complete(motion.frames))
-        moved = encode(torch.from_numpy(np.nan_to_num(motion.frames))).float()
-        return Tracks(torch.from_numpy(told), moved * present[:, None], present.float())
+        frames, present, said_and_heard = (
+            torch.from_numpy(array).to(self.scale.device)
+            for array in (np.nan_to_num(motion.frames), complete(motion.frames), told)
+        )
+        return Tracks(said_and_heard, encode(frames).float() * present[:, None], present.float())

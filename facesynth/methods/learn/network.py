@@ -49,11 +49,12 @@ def train(model: nn.Sequential, tracks: Sequence[Tracks], steps: int, seed: int,
     Returns the mean loss of the last tenth of the steps. The same seed gives the same weights on the same machine with the
     same number of threads. `what` is told beside the progress.
     """
+    device = next(model.parameters()).device
     optimiser = torch.optim.AdamW(model.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     rng, losses = np.random.default_rng(seed), []
     model.train()
-    with torch.random.fork_rng(devices=[]):  # dropout draws from torch's own generator
+    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):  # dropout draws from torch's own generator
         torch.manual_seed(seed)
         for _ in track(range(steps), what, steps):
             loss = _loss(model, _batch(tracks, rng))

@@ -1,0 +1,220 @@
+"""Every module on a second device: no tensor is made on the wrong one, and what comes out is what the processor gives."""
+
+import ast
+import copy
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+from corpora import tiny_corpus, tiny_layout
+from second_device import DEVICE, Elsewhere, second_device
+from torch import nn
+
+import facesynth
+from facesynth.cli.train import train
+from facesynth.device import device_of
+from facesynth.face.deform.mesh_distance import MeshDistanceDeformer
+from facesynth.face.deform.regions import RegionDeformer
+from facesynth.face.rig.markers import marker_layout
+from facesynth.face.solve.key_poses import KeyPoseMap, KeyPoses
+from facesynth.face.texture.mesh import ringed_mesh
+from facesynth.face.texture.warp import PiecewiseAffineWarp
+from facesynth.inference.errors import FacesynthError
+from facesynth.methods import registry
+from facesynth.methods.emotion.svm import Svm, SvmSettings
+from facesynth.motion.ica import Ica
+from facesynth.motion.pca import Pca
+from facesynth.motion.rbf import RbfMap
+from facesynth.speech.cepstrum import RealCepstrum
+from facesynth.speech.mel import LogMel
+from facesynth.speech.mel_cepstra import MelCepstra
+from facesynth.speech.periodogram import Periodogram
+from facesynth.speech.rasta_plp import RastaPlp
+
+ROOT = Path(facesynth.__file__).parent
+RNG = np.random.default_rng(0)
+FRAMES, SOUND = torch.from_numpy(RNG.normal(size=(40, 6))).float(), torch.from_numpy(RNG.normal(0, 0.1, 8000)).float()
+METHODS = {
+    "efase": {"audio_weight": 1.0, "pose_weight": 1.0},
+    "anime_graph": {"pose_weight": 1.0},
+    "coarticulation": {},
+    "lds": {"deterministic_order": 2, "stochastic_order": 2, "lead_ms": 0.0},
+    "mean_face": {},
+    "phone_mean": {},
+    "ridge": {},
+    "tcn": {"steps": 3},
+}
+"""What switches on all that a method has."""
+ON_THE_PROCESSOR = ("anime_graph",)
+"""Methods that are not yet moved."""
+LEARNING = tuple(name for name in METHODS if name not in ON_THE_PROCESSOR)
+
+
+def rbf_map():
+    return RbfMap.fit(FRAMES.numpy(), FRAMES.numpy()[:, :2], width=2.0, kernel="gaussian")
+
+
+def svm(kernel):
+    return Svm.fit(FRAMES.double().numpy(), np.arange(40) % 3, SvmSettings(kernel))
+
+
+def warp():
+    points = np.stack(np.meshgrid(np.arange(8, 30, 5), np.arange(8, 24, 5)), axis=-1).reshape(-1, 2)
+    mesh = ringed_mesh(points.astype(float))
+    reference = torch.from_numpy(mesh.reference).float()[None]
+    picture = torch.rand(1, 3, 32, 40, generator=torch.Generator().manual_seed(0))
+    return PiecewiseAffineWarp(torch.from_numpy(mesh.triangles), 32, 40), (picture, reference, reference + 0.4)
+
+
+def deformed(rig, deformer):
+    layout = marker_layout(rig)
+    rest = torch.from_numpy(rig.rest_mm[:1]).reshape(1, 3).repeat(3, len(layout.names)).float()
+    return deformer(rig, layout), (rest,)
+
+
+def posed_by_hand():
+    layout = tiny_layout()
+    frames = np.asarray(layout.neutral) + RNG.normal(0, 3, (6, layout.channels))
+    poses = KeyPoses(layout, ("jawOpen", "mouthClose"), frames, RNG.uniform(size=(6, 2)))
+    return KeyPoseMap.fit(poses, layout.neutral), (torch.from_numpy(frames),)
+
+
+PARTS = {
+    "key poses": lambda rig: posed_by_hand(),
+    "pca": lambda rig: (Pca.fit(FRAMES.numpy(), 3), (FRAMES,)),
+    "ica": lambda rig: (Ica.fit(RNG.uniform(size=(400, 2))), (FRAMES[:, :2],)),
+    "rbf": lambda rig: (rbf_map(), (FRAMES,)),
+    "real cepstrum": lambda rig: (RealCepstrum(20), (SOUND,)),
+    "mel cepstra": lambda rig: (MelCepstra(), (SOUND,)),
+    "log-mel": lambda rig: (LogMel(), (SOUND,)),
+    "periodogram": lambda rig: (Periodogram(29.97), (SOUND, 10)),
+    "RASTA-PLP": lambda rig: (RastaPlp(), (SOUND,)),
+    "warp": lambda rig: warp(),
+    "mesh distance": lambda rig: deformed(rig, MeshDistanceDeformer),
+    "regions": lambda rig: deformed(rig, RegionDeformer),
+    "linear svm": lambda rig: (svm("linear"), (FRAMES,)),
+    "radial svm": lambda rig: (svm("radial"), (FRAMES,)),
+}
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_module_gives_on_a_second_device_what_it_gives_on_the_processor(part, rig):
+    module, given = PARTS[part](rig)
+    wanted = module(*given)
+    with second_device():
+        moved = copy.deepcopy(module).to(DEVICE)
+        made = moved(*(x.to(DEVICE) if isinstance(x, torch.Tensor) else x for x in given))
+        several = isinstance(wanted, tuple)
+        for there, here in zip(made if several else [made], wanted if several else [wanted], strict=True):
+            assert isinstance(there, Elsewhere)
+            torch.testing.assert_close(there.cpu(), here, atol=2e-3 if part == "warp" else 1e-6, rtol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("devices") / "corpus", utterances=16, fps=60)
+
+
+@pytest.fixture(scope="module")
+def models(corpus, tmp_path_factory):
+    """Every method, trained on the processor, as a file."""
+    folder, patch = tmp_path_factory.mktemp("models"), pytest.MonkeyPatch()
+    patch.setattr("facesynth.methods.learn.expectation.STEPS", 3)
+    for name, config in METHODS.items():
+        registry.create(name, **config).fit(corpus).save(folder / name)
+    patch.undo()
+    return folder
+
+
+def test_every_method_is_tried(models):
+    assert set(METHODS) == set(registry.list_methods())
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if name not in ON_THE_PROCESSOR])
+def test_a_method_speaks_on_a_second_device_as_on_the_processor(name, models, corpus):
+    speech = corpus[corpus.ids[0]].speech
+    wanted = registry.load(models / name).synthesize(speech).frames
+    with second_device():
+        model = registry.load(models / name).to(DEVICE)
+        assert all(isinstance(tensor, Elsewhere) for tensor in model.state_dict().values())
+        np.testing.assert_allclose(model.synthesize(speech).frames, wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", LEARNING)
+def test_a_method_learns_where_its_tensors_are(name, models, corpus, monkeypatch):
+    monkeypatch.setattr("facesynth.methods.learn.expectation.STEPS", 3)
+    with second_device():
+        model = registry.create(name, **METHODS[name]).to(DEVICE).fit(corpus)
+        assert all(isinstance(tensor, Elsewhere) for tensor in model.state_dict().values())
+        np.testing.assert_allclose(
+            model.synthesize(corpus[corpus.ids[0]].speech).frames,
+            registry.load(models / name).synthesize(corpus[corpus.ids[0]].speech).frames,
+            atol=1e-2,
+        )
+
+
+def test_no_module_is_forgotten(models, rig):
+    tried = {type(part) for make in PARTS.values() for part in make(rig)[0].modules()}
+    tried |= {type(part) for name in METHODS for part in registry.load(models / name).modules()}
+    assert {kind.__qualname__ for kind in modules() - tried} <= {"Method", "EmotionDetector"}
+
+
+def modules():
+    """Every class of facesynth that is a torch module."""
+    found = set()
+    for path in ROOT.rglob("*.py"):
+        source = path.read_text(encoding="utf-8")
+        if "Module)" in source or "(Method)" in source:
+            module = importlib.import_module(".".join(("facesynth", *path.relative_to(ROOT).with_suffix("").parts)))
+            names = [node.name for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]
+            kinds = [getattr(module, name, None) for name in names]
+            found |= {kind for kind in kinds if isinstance(kind, type) and issubclass(kind, nn.Module)}
+    return found
+
+
+def test_the_second_device_is_told_from_the_processor():
+    with second_device():
+        there, here = torch.ones(3, device=DEVICE), torch.ones(3)
+        assert (there + 1).cpu().tolist() == [2, 2, 2]
+        with pytest.raises(AssertionError, match="on the processor"):
+            there + here
+        with pytest.raises(RuntimeError, match="numpy"):
+            there.numpy()
+
+
+def test_devices_by_name(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    assert device_of("auto") == device_of("cpu") == torch.device("cpu")
+    with pytest.raises(FacesynthError, match="no device cuda here .found: none of the kind."):
+        device_of("cuda")
+    with pytest.raises(FacesynthError, match="did you mean cuda"):
+        device_of("cudo")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    assert device_of("auto") == torch.device("cuda")
+    assert device_of("cuda:1") == torch.device("cuda:1")
+    with pytest.raises(FacesynthError, match="cuda:0, cuda:1"):
+        device_of("cuda:2")
+
+
+def test_train_says_in_one_line_that_a_device_is_not_there(corpus, tmp_path, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    (tmp_path / "there.yaml").write_text("device: auto\n")
+    (tmp_path / "elsewhere.yaml").write_text("device: cuda\n")
+    model = tmp_path / "model.safetensors"
+    with pytest.raises(FacesynthError, match="no device cuda here"):
+        run("mean_face", corpus.path, "-o", model, "--config", tmp_path / "elsewhere.yaml")
+    with pytest.raises(FacesynthError, match="no device cuda here"):
+        run("mean_face", corpus.path, "-o", model, "--config", tmp_path / "there.yaml", "--device", "cuda")
+    assert not model.exists()
+    assert run("mean_face", corpus.path, "-o", model, "--config", tmp_path / "elsewhere.yaml", "--device", "cpu").exit_code == 0
+    assert registry.load(model).device == torch.device("cpu")
+    assert run("mean_face", corpus.path, "-o", model, "--config", tmp_path / "there.yaml").exit_code == 0
+
+
+def run(*arguments):
+    return CliRunner().invoke(train, [str(argument) for argument in arguments], catch_exceptions=False)
