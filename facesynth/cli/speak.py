@@ -45,8 +45,8 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--to-intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of --to-emotion.")
 @click.option("--maps", type=FILE, help="A model that learned maps between emotions, which --to-emotion uses.")
 @click.option("--fps", type=Fps(), show_default="30", help="Frame rate of what is written.")
-@click.option("--head", type=PartType(), default="1", show_default=True, help="off, recorded alone, or a factor on head motion.")
-@click.option("--eyes", type=PartType(), default="1", show_default=True, help="off, recorded alone, or a factor on gaze.")
+@click.option("--head", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")
+@click.option("--eyes", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")
 @click.option("--size", type=Size(), show_default="1280x720", help="Of the video.")
 @click.option(
     "--rig",
@@ -127,6 +127,7 @@ def _read_files(model: Path, request: Request) -> list[Path]:
     """What is read beside the speech: the model, its speaker's pictures, and every file that was given."""
     asked = [value for name, value in {**vars(request), **request.own}.items() if name != "explain"]
     given = [value for value in asked if isinstance(value, Path)]
+    given += [part.model for part in (request.head, request.eyes) if part.model is not None]
     parts = [path for folder in given if folder.is_dir() for path in sorted(folder.iterdir())]
     return [model, model.with_name(f"{model.stem}.face.npz"), *given, *parts]
 

@@ -17,9 +17,9 @@ BROADCAST = {"23.976": Fraction(24000, 1001), "29.97": Fraction(30000, 1001), "5
 
 
 class PartType(click.ParamType):
-    """Who moves a part of the face: `off`, `recorded` or a factor."""
+    """Who moves a part of the face: `off`, `recorded`, a factor, or a model of that part."""
 
-    name = "off|recorded|factor"
+    name = "off|recorded|factor|model"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Part:
         """The part as it was asked for."""
@@ -27,9 +27,9 @@ class PartType(click.ParamType):
         from facesynth.stage.request import Part
 
         try:
-            return Part(value) if value in ("off", "recorded") else Part(gain=float(value))
-        except (ValueError, FacesynthError):
-            self.fail(f"wanted off or a factor such as 0.5, or recorded; got {value!r}", param, ctx)
+            return value if isinstance(value, Part) else Part.of(str(value))
+        except (ValueError, FacesynthError) as error:
+            self.fail(f"wanted off, recorded, a factor such as 0.5 or a model's file; got {value!r} ({error})", param, ctx)
 
 
 class Fps(click.ParamType):

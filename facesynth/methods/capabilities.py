@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from facesynth.inference.errors import FacesynthError
 
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from facesynth.inference.motion import Motion
     from facesynth.inference.speech import Speech
 
+Part = Literal["mouth", "head", "eyes"]
+"""Of the face: what a method moves."""
 OptionType = type[bool] | type[int] | type[float] | type[str] | type[Path]
 
 
@@ -129,6 +131,8 @@ class Capabilities:
     """One line, for those who choose."""
     home: str = ""
     """The module that registers the class when it is imported; empty for a class that registered itself already."""
+    part: Part = "mouth"
+    """What it moves. A method of the head or the eyes leaves the frames at rest and moves `Motion.head` or `Motion.eyes`."""
     options: tuple[Option, ...] = ()
     """Its own options of `speak`."""
     abilities: frozenset[type] = field(default_factory=frozenset)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.methods.capabilities import Explaining, MappingEmotions
 from facesynth.methods.method import Method
 from facesynth.methods.registry import able, ask, load, read_option, require, require_option
-from facesynth.stage.request import AUTO, Request
+from facesynth.motion.resample import resample
+from facesynth.stage.request import AUTO, Part, Request
 
 if TYPE_CHECKING:
     from facesynth.methods.emotion.detector import EmotionDetector
@@ -26,32 +30,81 @@ class Cast:
     """Who makes the motion of one performance after the other."""
 
     mouth: Method
+    head: Method | None = None
+    """Moves the head, where a model of its own was asked for."""
+    eyes: Method | None = None
+    """The same of the eyes."""
     mapper: MappingEmotions | None = None
     """Maps the motion to another emotion."""
     detector: EmotionDetector | None = None
     """Hears the emotion."""
 
-    def options(self, request: Request, phones: PhoneTrack) -> dict[str, Any]:
-        """The mouth's own options, files of them read."""
-        return {name: read_option(self.mouth, name, value, phones) for name, value in request.own.items()}
+    @property
+    def members(self) -> tuple[Method, ...]:
+        """Who moves something."""
+        return tuple(one for one in (self.mouth, self.head, self.eyes) if one is not None)
+
+    def options(self, request: Request, phones: PhoneTrack, mover: Method | None = None) -> dict[str, Any]:
+        """The own options of one of them, of the mouth where none is named; files of them are read."""
+        mover = mover or self.mouth
+        asked = {name: value for name, value in request.own.items() if mover.capabilities.option(name)}
+        return {name: read_option(mover, name, value, phones) for name, value in asked.items()}
 
     def motion(self, speech: Speech, request: Request, options: dict[str, Any]) -> Motion:
-        """Of the mouth, at its own rate, mapped to another emotion where that was asked for."""
+        """Of the mouth, at its own rate, mapped to another emotion where that was asked for; head and eyes of their models."""
         motion = self.mouth.synthesize(speech, seed=request.seed, **options)
-        if self.mapper is None or request.to_emotion is None:
-            return motion
-        return self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
+        if self.mapper is not None and request.to_emotion is not None:
+            motion = self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
+        if self.head is not None:
+            own = self.options(request, speech.phones, self.head)
+            motion = replace(motion, head=at_clock(self.head.synthesize(speech, seed=request.seed, **own), motion).head)
+        if self.eyes is not None:
+            own = self.options(request, speech.phones, self.eyes)
+            motion = replace(motion, eyes=at_clock(self.eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
+        return motion
+
+
+def at_clock(part: Motion, motion: Motion) -> Motion:
+    """Head and eyes of one motion at the frames of another, which may be a frame longer: there they are held."""
+    still = np.zeros((len(part), 1), np.float32)
+    there = resample(replace(part, frames=still, layout=Layout("curves", ("still",))), motion.fps)
+    at = np.minimum(np.arange(len(motion)), len(there) - 1)
+    head, eyes = (None if value is None else value[at] for value in (there.head, there.eyes))
+    return replace(there, frames=there.frames[at], head=head, eyes=eyes)
 
 
 def cast_for(mouth: Method, request: Request) -> Cast:
     """The models that a request needs; FacesynthError for what none of them can do."""
+    if mouth.capabilities.part != "mouth":
+        part = mouth.capabilities.part
+        raise FacesynthError(f"{mouth.name} moves the {part} alone: give its file with --{part}, beside a model of the mouth")
     if request.emotion not in (None, AUTO, *mouth.emotions):
         raise unknown("emotion", str(request.emotion), mouth.emotions)
+    cast = Cast(
+        mouth,
+        _mover("head", request.head),
+        _mover("eyes", request.eyes),
+        _mapper(mouth, request),
+        _detector(mouth, request.detector) if request.listens else None,
+    )
     for name in request.own:
-        require_option(mouth, name)
+        if not any(one.capabilities.option(name) for one in cast.members):
+            require_option(mouth, name)
     if request.explain is not None:
         require(mouth, Explaining)
-    return Cast(mouth, _mapper(mouth, request), _detector(mouth, request.detector) if request.listens else None)
+    return cast
+
+
+def _mover(part: str, asked: Part) -> Method | None:
+    """The model that moves a part, where one was asked for."""
+    if asked.model is None:
+        return None
+    mover = load(asked.model)
+    if mover.capabilities.part != part:
+        raise FacesynthError(f"{asked.model} moves the {mover.capabilities.part}; --{part} wants a model of the {part}")
+    if asked.method not in ("", mover.name, mover.name.removeprefix(f"{part}_")):
+        raise FacesynthError(f"{asked.model} holds a model of {mover.name}, not of {asked.method}")
+    return mover
 
 
 def _mapper(mouth: Method, request: Request) -> MappingEmotions | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -14,12 +15,12 @@ AUTO = "auto"
 """In place of an emotion, or of a track of emotions: as heard in the voice."""
 SIDES_PX = (32, 4096)
 RATES_HZ = (1, 1000)
-SOURCES = ("default", "recorded", "off")
+SOURCES = ("default", "recorded", "off", "model")
 DEFORMS = ("shapes", "distance", "regions")
 PICTURES = ("coherent", "nearest")
 FILES = ("phones", "detector", "maps", "explain", "rig", "mapping")
 
-Source = Literal["default", "recorded", "off"]
+Source = Literal["default", "recorded", "off", "model"]
 Deform = Literal["shapes", "distance", "regions"]
 Pictures = Literal["coherent", "nearest"]
 
@@ -30,15 +31,31 @@ class Part:
 
     source: Source = "default"
     """`recorded`: as the mouth's model knows it from its recordings, else still; `default`: the same, else quietly by
-    chance; `off`: still."""
+    chance; `off`: still; `model`: as a model of this part alone says."""
     gain: float = 1.0
     """Factor on the motion."""
+    model: Path | None = None
+    """File of the model."""
+    method: str = ""
+    """Of the model, where whoever asked for it said so: `knn` or `head_knn` of a head."""
+
+    @classmethod
+    def of(cls, text: str) -> Part:
+        """`off`, `recorded`, a factor such as 0.5, or a model as [METHOD:]FILE[:FACTOR]."""
+        if text in ("off", "recorded"):
+            return cls("off" if text == "off" else "recorded")
+        if (gain := _number(text)) is not None:
+            return cls(gain=gain)
+        method, file, factor = re.fullmatch(r"(?:([a-z_]{2,}):)?(.*?)(?::([\d.]+))?", text, re.DOTALL).groups()  # type: ignore[union-attr]
+        return cls("model", float(factor or 1), Path(file), method or "")
 
     def __post_init__(self) -> None:
         if self.source not in SOURCES:
             raise unknown("source of a motion", self.source, SOURCES)
         if not 0 <= self.gain < float("inf"):
             raise FacesynthError(f"a factor on a motion must be 0 or above, such as 0.5; got {self.gain}")
+        if (self.source == "model") != (self.model is not None):
+            raise FacesynthError("a part that a model moves needs its file, and no other part has one")
 
     @property
     def factor(self) -> float:
@@ -113,6 +130,13 @@ class Request:
     def listens(self) -> bool:
         """Whether the emotion is to be heard in the voice."""
         return AUTO in (self.emotion, str(self.emotions))
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def _check_size(size: tuple[int, int]) -> None:

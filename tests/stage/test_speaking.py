@@ -105,7 +105,7 @@ def test_parts_and_paths_of_a_request():
     assert not Request(emotion="happy").listens
     assert Part("off").factor == 0
     with pytest.raises(FacesynthError, match="unknown source"):
-        Part("model")
+        Part("nobody")
     with pytest.raises(FacesynthError, match="0 or above"):
         Part(gain=float("inf"))
 
