@@ -14,6 +14,7 @@ _MODELS = {
     "emotion": ".emotion:load_detector",
     "efase": ".efase.exported:load_efase",
     "anime_graph": ".anime_graph.exported:load_anime_graph",
+    "coarticulation": ".coarticulation.model:load_coarticulation",
     "graphs": ".parts:Parts",
 }
 

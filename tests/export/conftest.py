@@ -54,6 +54,15 @@ def efase_file(small_corpus, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def coarticulation_file(small_corpus, tmp_path_factory):
+    from facesynth.methods.coarticulation.method import Coarticulation
+
+    path = tmp_path_factory.mktemp("models") / "coarticulation.safetensors"
+    Coarticulation(triphones=3).fit(small_corpus).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
 def anime_file(small_corpus, tmp_path_factory):
     from facesynth.methods.anime_graph.method import AnimeGraph
 

@@ -7,4 +7,5 @@ CAPABILITIES = Capabilities(
     "Deng 2006: key shapes of phones, blended by learned functions of time",
     home="facesynth.methods.coarticulation.method",
     minutes=1.0,
+    exporter="facesynth.export.coarticulation:coarticulation_content",
 )

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from facesynth.inference.coarticulation import Floats
+from facesynth.inference.coarticulation.blending import Floats
 
 
 def decompose(frames: Floats, samples: Floats, prior: Floats, stiffness: float) -> Floats:

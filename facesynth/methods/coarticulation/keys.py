@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.inference.coarticulation import Floats, Ints, KeyShapes, pace_of
-from facesynth.inference.phones import PHONES, VISEME_CLASSES, viseme_of
+from facesynth.inference.coarticulation.blending import Floats, Ints, KeyShapes, pace_of
+from facesynth.inference.coarticulation.model import CLASS_OF
+from facesynth.inference.phones import PHONES, VISEME_CLASSES
 
 FAR = 3.0
 """How many times as strongly changes by phones two away are drawn to nothing as those by neighbours."""
 USUAL_S = 0.08
 """Length of a phone of a class that was never recorded, s."""
-CLASS_OF = np.array([viseme_of(phone) for phone in PHONES])
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,4 +79,4 @@ def _mean(values: Floats, otherwise: Floats) -> Floats:
 
 
 def _drawn(values: Floats, towards: Floats, count: float) -> Floats:
-    return np.asarray((values.sum(axis=0) + count * towards) / (len(values) + count))
+    return np.asarray((values.sum(axis=0) + count * towards) / (len(values) + count) if len(values) else towards)

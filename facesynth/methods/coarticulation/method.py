@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any, Self
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.coarticulation import Floats, KeyShapes, WeightModels, blend_key_shapes
+from facesynth.inference.coarticulation.blending import Floats, KeyShapes, WeightModels
+from facesynth.inference.coarticulation.model import KEY_FIELDS, MODEL_FIELDS, Parts, as_doubles, weight_models
+from facesynth.inference.coarticulation.model import Coarticulation as Runtime
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.filters import gaussian
+from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, VISEME_CLASSES
 from facesynth.inference.speech import Speech
 from facesynth.methods.coarticulation.capabilities import CAPABILITIES
-from facesynth.methods.coarticulation.keys import CLASS_OF, learn_keys
+from facesynth.methods.coarticulation.keys import learn_keys
 from facesynth.methods.coarticulation.recordings import Track, samples_of, track_of, transitions_of, usable
 from facesynth.methods.coarticulation.transitions import learn_models
 from facesynth.methods.learn.frames import mean_pose, refuse_options
@@ -25,10 +27,6 @@ from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
 NEUTRAL = "neutral"
-SMOOTHING_S = 0.02
-"""Standard deviation of the smoothing over the joints of models, which need not meet."""
-KEY_FIELDS = tuple(field.name for field in fields(KeyShapes))
-MODEL_FIELDS = tuple(field.name for field in fields(WeightModels))
 
 
 @register(CAPABILITIES)
@@ -98,8 +96,9 @@ class Coarticulation(Method):
             pull=self.config["pull"],
             least=least,
         )
-        self._keep(rest, basis, keys, models)
+        self.keep(rest, basis, keys, models)
         self.facts = {
+            "closed_gap": closed_gap(chosen, corpus),
             "recordings": len(chosen),
             "phone_samples": len(samples.phones),
             "triphone_models": len(models.triphone_keys),
@@ -110,27 +109,30 @@ class Coarticulation(Method):
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Motion from phones alone; the sound is not heard, emotions are not felt. Nothing is random."""
         refuse_options(self.name, options)
-        layout, phones = self.fitted_layout, speech.phones
-        numbers = np.array([PHONES.index(label) for label in phones.labels])
-        classes = CLASS_OF[numbers]
-        keys = self.key_shapes().of(numbers, classes, phones.ends_s - phones.starts_s)
-        times_s = np.arange(phones.frame_bounds(self.fps)[-1]) / self.fps
-        shapes = gaussian(blend_key_shapes(phones, classes, keys, self.models(), times_s), SMOOTHING_S * self.fps)
-        return Motion(self.decode(torch.from_numpy(shapes).to(self.basis)).cpu().numpy(), self.fps, layout)
+        return self.speaker().synthesize(speech)
 
-    def decode(self, shapes: Tensor) -> Tensor:
-        """Displacements [T, D] to frames [T, C]."""
-        return self.rest + shapes @ self.basis.T
+    def speaker(self) -> Runtime:
+        """The model that speaks: what an exported folder is, with this module's arrays for its graph."""
+        gap = self.facts["closed_gap"]
+        return Runtime(
+            Parts(
+                layout=self.fitted_layout,
+                fps=self.fps,
+                emotions=self.emotions,
+                keys=KeyShapes(**{name: as_doubles(_array(getattr(self, name))) for name in KEY_FIELDS}),
+                models=weight_models({name: _array(getattr(self, name)) for name in MODEL_FIELDS}),
+                closed_gap=np.inf if gap is None else float(gap),
+                decode=self.decode_array,
+            )
+        )
 
-    def key_shapes(self) -> KeyShapes:
-        """What phones look like."""
-        return KeyShapes(**{name: _array(getattr(self, name)) for name in KEY_FIELDS})
+    def decode_array(self, shapes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Displacements [..., T, D] to frames [..., T, C]."""
+        frames = self.rest + torch.from_numpy(shapes).to(self.basis) @ self.basis.T
+        return np.asarray(frames.cpu().numpy())
 
-    def models(self) -> WeightModels:
-        """How they blend."""
-        return WeightModels(_array(self.diphones), self.triphone_keys.cpu().numpy().astype(np.int64), _array(self.triphones))
-
-    def _keep(self, rest: Floats, basis: Floats, keys: KeyShapes, models: WeightModels) -> None:
+    def keep(self, rest: Floats, basis: Floats, keys: KeyShapes, models: WeightModels) -> None:
+        """Take a rest pose [C], components [C, D], key shapes and polynomials for one's own."""
         arrays = {"rest": rest, "basis": basis}
         arrays |= {name: getattr(keys, name) for name in KEY_FIELDS} | {name: getattr(models, name) for name in MODEL_FIELDS}
         device = self.device
@@ -161,5 +163,15 @@ def displacement_basis(chosen: list[Utterance], corpus: Corpus, components: floa
     return rest, directions * np.sign(directions[np.abs(directions).argmax(axis=0), np.arange(directions.shape[1])])
 
 
-def _array(buffer: Tensor) -> Floats:
-    return buffer.detach().cpu().numpy().astype(np.float64)
+def closed_gap(chosen: list[Utterance], corpus: Corpus) -> float | None:
+    """How near the lips come at p, b and m; None where the layout has no lips or none of these phones was recorded."""
+    gaps = [
+        gap
+        for utterance in chosen
+        for gap in narrowest_gaps(utterance.motion.frames, corpus.layout, bilabial_spans(utterance.speech.phones, corpus.fps))
+    ]
+    return float(np.median(gaps)) if gaps else None
+
+
+def _array(buffer: Tensor) -> NDArray[Any]:
+    return np.asarray(buffer.detach().cpu().numpy())

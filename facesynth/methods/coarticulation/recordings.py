@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth.corpus import Utterance
-from facesynth.inference.coarticulation import Floats, Ints
+from facesynth.inference.coarticulation.blending import Floats, Ints
+from facesynth.inference.coarticulation.model import CLASS_OF
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import PhoneTrack
 from facesynth.methods.coarticulation.decomposition import decompose, linear_weights
-from facesynth.methods.coarticulation.keys import CLASS_OF, PhoneSamples
+from facesynth.methods.coarticulation.keys import PhoneSamples
 from facesynth.methods.coarticulation.transitions import Transitions
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.inference.coarticulation import Floats, Ints, WeightModels
+from facesynth.inference.coarticulation.blending import Floats, Ints, WeightModels
 from facesynth.methods.coarticulation.decomposition import cosine_weights
 
 DEGREE = 3

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .phones import SILENCE
-from .speech import PhoneTrack
+from ..phones import SILENCE
+from ..speech import PhoneTrack
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -1,0 +1,74 @@
+"""Train the co-articulation model on a corpus, judge it on sentences left out, and save it.
+
+python train/coarticulation.py CORPUS [--config configs/coarticulation.yaml] [-o coarticulation.safetensors] [--seed 0]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from facesynth.config import load_config
+from facesynth.corpus import Corpus
+from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.geometry import marker_error
+from facesynth.inference.coarticulation.blending import WeightModels
+from facesynth.methods.coarticulation.method import Coarticulation
+from facesynth.methods.training import train as learn
+
+CONFIG = Path(__file__).parents[1] / "configs" / "coarticulation.yaml"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = parse(arguments)
+
+    # Load, and leave sentences out.
+    corpus = Corpus.open(options.corpus)
+    train, test = corpus.split(options.seed)
+    print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
+
+    # Fit: key shapes of phones, and polynomials of the time by viseme class.
+    model = learn(Coarticulation, train, load_config(options.config), seed=options.seed)
+    report(model)
+
+    # Evaluate.
+    made = [(model.synthesize(utterance.speech), utterance.motion) for utterance in test]
+    error, energy = np.mean([(marker_error(*pair), energy_ratio(*pair)) for pair in made], axis=0)
+    print(f"error on sentences left out: {error:.4g} {corpus.layout.unit}, energy {energy:.2f}")
+
+    # Save.
+    model.save(options.output)
+    print(f"{options.output} written")
+
+
+def report(model: Coarticulation) -> None:
+    facts, models = model.facts, model.speaker().parts.models
+    print(f"{facts['phone_samples']} samples of phones from {facts['recordings']} recordings")
+    if missing := facts["phones_without_sample"]:
+        print(f"never recorded, so they take the shape of their class: {' '.join(missing)}")
+    if (gap := facts["closed_gap"]) is not None:
+        print(f"lips come as near as {gap:.3g} {model.fitted_layout.unit} at p, b and m")
+    print(f"triphones with polynomials of their own: {facts['triphone_models']}; the common weights of a diphone:")
+    print(mean_weights(models))
+
+
+def mean_weights(models: WeightModels) -> str:
+    t = np.linspace(0, 1, 5)
+    powers = np.vander(t, models.diphones.shape[-1], increasing=True)
+    rows = zip(("first", "second"), models.diphones.mean(axis=(0, 1)) @ powers.T, strict=True)
+    return "\n".join(f"  {name:6}" + "".join(f"{weight:7.2f}" for weight in weights) for name, weights in rows)
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("--config", type=Path, default=CONFIG)
+    parser.add_argument("-o", "--output", type=Path, default=Path("coarticulation.safetensors"))
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    main()
