@@ -28,6 +28,9 @@ from facesynth.methods.emotion.svm import Svm, SvmSettings
 from facesynth.motion.ica import Ica
 from facesynth.motion.pca import Pca
 from facesynth.motion.rbf import RbfMap
+from facesynth.motion.search.cheapest import cheapest
+from facesynth.motion.search.jumps import JumpSteps
+from facesynth.motion.search.pictures import PictureSteps
 from facesynth.speech.cepstrum import RealCepstrum
 from facesynth.speech.mel import LogMel
 from facesynth.speech.mel_cepstra import MelCepstra
@@ -48,9 +51,6 @@ METHODS = {
     "tcn": {"steps": 3},
 }
 """What switches on all that a method has."""
-ON_THE_PROCESSOR = ("anime_graph",)
-"""Methods that are not yet moved."""
-LEARNING = tuple(name for name in METHODS if name not in ON_THE_PROCESSOR)
 
 
 def rbf_map():
@@ -133,7 +133,7 @@ def test_every_method_is_tried(models):
     assert set(METHODS) == set(registry.list_methods())
 
 
-@pytest.mark.parametrize("name", [name for name in METHODS if name not in ON_THE_PROCESSOR])
+@pytest.mark.parametrize("name", METHODS)
 def test_a_method_speaks_on_a_second_device_as_on_the_processor(name, models, corpus):
     speech = corpus[corpus.ids[0]].speech
     wanted = registry.load(models / name).synthesize(speech).frames
@@ -143,7 +143,7 @@ def test_a_method_speaks_on_a_second_device_as_on_the_processor(name, models, co
         np.testing.assert_allclose(model.synthesize(speech).frames, wanted, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", LEARNING)
+@pytest.mark.parametrize("name", METHODS)
 def test_a_method_learns_where_its_tensors_are(name, models, corpus, monkeypatch):
     monkeypatch.setattr("facesynth.methods.learn.expectation.STEPS", 3)
     with second_device():
@@ -156,10 +156,39 @@ def test_a_method_learns_where_its_tensors_are(name, models, corpus, monkeypatch
         )
 
 
+def jump_steps():
+    ends, links = torch.from_numpy(RNG.normal(size=(2, 4, 1, 5, 3))), torch.tensor([[[1, -1, 0, 2, 3]]]).repeat(4, 1, 1)
+    return JumpSteps(list(ends[0]), list(ends[1]), list(links), 1.0, 0.5)
+
+
+def picture_steps():
+    looks, numbers = torch.from_numpy(RNG.normal(size=(9, 4))), torch.from_numpy(RNG.integers(0, 9, (4, 5)))
+    return PictureSteps(looks, torch.arange(9) % 4 == 0, numbers, 0.7)
+
+
+SEARCHES = {"jumps": jump_steps, "pictures": picture_steps}
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+def test_the_cheapest_path_is_the_same_on_a_second_device(search):
+    steps, targets = SEARCHES[search](), list(torch.from_numpy(RNG.uniform(size=(4, 1, 5))))
+    wanted = cheapest(targets, steps)
+    with second_device():
+        found = cheapest([target.to(DEVICE) for target in targets], steps.to(DEVICE))
+        assert isinstance(found.path, Elsewhere)
+        assert torch.equal(found.path.cpu(), wanted.path)
+        torch.testing.assert_close(found.cost.cpu(), wanted.cost)
+
+
+BY_EFASE = {"MotionNodeSteps", "MotionNodeSearch"}
+"""What eFASE makes when it speaks on another device than the processor."""
+
+
 def test_no_module_is_forgotten(models, rig):
-    tried = {type(part) for make in PARTS.values() for part in make(rig)[0].modules()}
+    tried = {type(make()) for make in SEARCHES.values()}
+    tried |= {type(part) for make in PARTS.values() for part in make(rig)[0].modules()}
     tried |= {type(part) for name in METHODS for part in registry.load(models / name).modules()}
-    assert {kind.__qualname__ for kind in modules() - tried} <= {"Method", "EmotionDetector"}
+    assert {kind.__qualname__ for kind in modules() - tried} <= {"Method", "EmotionDetector", *BY_EFASE}
 
 
 def modules():

@@ -134,6 +134,7 @@ class AnimeGraph(Method):
 
         `seed` starts the components and the maps.
         """
+        device = self.device
         self.learned_from(corpus)
         frames = corpus.arrays().frames
         frames = frames[np.isfinite(frames).all(axis=1)]
@@ -156,10 +157,10 @@ class AnimeGraph(Method):
         self.register_buffer("cutoffs_hz", torch.from_numpy(cutoffs_hz(runs, self.fps)))
         self.facts["utterances"] = list(corpus.ids)
         if self.predictor is not None:
-            self.predictor.learn(corpus, self.in_metric, seed)
+            self.predictor.learn(corpus, lambda frames: self.in_metric(frames.cpu()).to(device), seed)
         self._fit_maps([take for take in takes if take is not None], seed)
         self._chooser = None
-        return self
+        return self.to(device)
 
     def in_metric(self, frames: torch.Tensor) -> torch.Tensor:
         """Frames [T, C] as components times metric [T, D], whose squared distance is the mean over the channels."""
