@@ -73,6 +73,7 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
     show_default=True,
     help="Real face: recorded pictures that follow each other well, or simply the nearest.",
 )
+@click.option("--device", default="auto", show_default=True, help="Where the model runs: auto, cpu, cuda or mps.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def speak(
@@ -81,6 +82,7 @@ def speak(
     speech: tuple[Path, ...],
     outputs: tuple[Path, ...],
     text_file: Path | None,
+    device: str,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -88,13 +90,14 @@ def speak(
 
     A transcript (clip.txt) or phones (clip.TextGrid) beside a sound file are used where none are given.
     """
+    from facesynth.device import device_of
     from facesynth.methods.registry import load
     from facesynth.stage.performance import check_output
     from facesynth.stage.speaking import produce
 
     for line in own_options()[1]:
         _tell(f"warning: {line}")
-    request = _request(text_file, given)
+    place, request = device_of(device), _request(text_file, given)
     targets, paths = [check_output(path) for path in outputs], recordings(speech)
     if len(paths) > 1:
         _require_batch(targets, request)
@@ -102,7 +105,7 @@ def speak(
     plan = plan_targets(paths, targets, [path for path in speech if path.is_dir()], read)
     if request.explain:
         require_free(request.explain, [*paths, *read])
-    production = produce(load(model), targets, request)
+    production = produce(load(model).to(place), targets, request)
     if len(paths) > 1:
         _say_all(production, plan, as_json)
         return
