@@ -1,15 +1,16 @@
 """Search of the cost's parameters on sentences that are not in the database (Deng 2006, §5.3.6).
 
 The error is piecewise constant in the parameters (the path changes or it does not), so there is no
-gradient: differential evolution (SciPy) over the logarithms of PNT and of the seven weights. Every
-evaluation is kept in a file; a search that was interrupted and is started again with the same seed
-takes from there what is done and goes on.
+gradient: a tree-structured Parzen estimator (Optuna) over the logarithms of PNT and of the six weights, begun
+with the published ones. Trials are asked for in groups, so that what is found does not depend on the number of
+processes. Every evaluation is kept in a file; a search that was interrupted and is started again with the same
+seed asks for the same trials, takes from there what is done and goes on.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -18,8 +19,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import optuna
 import torch
-from scipy.optimize import differential_evolution
 from tqdm import tqdm
 
 from facesynth.corpus import Corpus, Record, Utterance
@@ -41,7 +42,7 @@ RANGES: dict[str, tuple[float, float]] = {
 PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 """Deng 2006; PNT is ours, the dissertation gives none."""
 CROWD = 4
-"""Members of the population for each setting."""
+"""Trials of a group for each setting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,35 +93,36 @@ def tune(
 ) -> Tuning:
     """Find settings for a model whose database holds neither `tuning` nor `test`.
 
-    `generations` of CROWD × 7 evaluations each follow the first one. journal: a file of JSON lines,
-    one for each evaluation, which makes the search resumable; it belongs to one model and seed.
+    `generations` groups of CROWD × 7 trials follow the first one, which is drawn at random but for the published settings.
+    journal: a file of JSON lines, one for each evaluation, which makes the search resumable; it belongs to one model and seed.
     """
     kept = _Journal(Path(journal), {"seed": seed, "corpus": model.provenance.get("sha256"), "sentences": list(tuning.ids)})
-    bounds = [(np.log(low), np.log(high)) for low, high in RANGES.values()]
-    total = CROWD * len(RANGES) * (generations + 1)
-    with TemporaryDirectory() as folder, _Workers(model, tuning, kept, workers, total, Path(folder)) as pool:
-        found = differential_evolution(
-            pool.error_of,
-            bounds,
-            maxiter=generations,
-            popsize=CROWD,
-            updating="deferred",
-            workers=pool.map,
-            polish=False,
-            tol=0,
-            seed=seed,
-        )
-    settings = {name: float(np.exp(value)) for name, value in zip(RANGES, found.x, strict=True)}
+    group = CROWD * len(RANGES)
+    study = _study(seed, group)
+    with TemporaryDirectory() as folder, _Workers(model, tuning, kept, workers, group * (generations + 1), Path(folder)) as pool:
+        for _ in range(generations + 1):
+            trials = [study.ask() for _ in range(group)]
+            settings = [{name: trial.suggest_float(name, *RANGES[name], log=True) for name in RANGES} for trial in trials]
+            for trial, error in zip(trials, pool.errors_of(settings), strict=True):
+                study.tell(trial, error)
     examples = examples_of(model, test)
     return Tuning(
-        settings,
-        float(found.fun),
-        len(kept.errors),
+        study.best_params,
+        float(study.best_value),
+        len(study.trials),
         tuple(tuning.ids),
         tuple(test.ids),
-        mean_error(model.with_weights(**settings), examples),
+        mean_error(model.with_weights(**study.best_params), examples),
         mean_error(model.with_weights(**PUBLISHED), examples),
     )
+
+
+def _study(seed: int, group: int) -> optuna.Study:
+    """A search that begins with the published settings; Optuna tells of a study only what goes wrong."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(n_startup_trials=group, seed=seed))
+    study.enqueue_trial(PUBLISHED)
+    return study
 
 
 def tuned(
@@ -222,19 +224,16 @@ class _Workers:
         if self.pool:
             self.pool.shutdown(cancel_futures=True)
 
-    def error_of(self, point: Floats) -> float:
-        return next(self.map(None, [point]))
-
-    def map(self, _: Callable | None, points: Iterable[Floats]) -> Any:
-        points = list(points)
-        keys = [json.dumps([round(float(v), 12) for v in point]) for point in points]
+    def errors_of(self, settings: Sequence[dict[str, float]]) -> list[float]:
+        """One for each; what the journal knows is not computed again."""
+        keys = [json.dumps([round(float(np.log(one[name])), 12) for name in RANGES]) for one in settings]
         missing = [i for i, key in enumerate(keys) if key not in self.journal.errors]
-        jobs = [{name: float(np.exp(v)) for name, v in zip(RANGES, points[i], strict=True)} for i in missing]
+        jobs = [settings[i] for i in missing]
         errors = self.pool.map(_work, jobs) if self.pool else (self._error(job) for job in jobs)
         for i, error in zip(missing, errors, strict=True):
             self.journal.keep(keys[i], error)
             self.bar.update()
-        return iter([self.journal.errors[key] for key in keys])
+        return [self.journal.errors[key] for key in keys]
 
     def _error(self, settings: dict[str, float]) -> float:
         return mean_error(self.model.with_weights(**settings), self.examples)
