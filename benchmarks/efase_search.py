@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from dense_search import dense_search, transition_matrix
 from scipy.ndimage import gaussian_filter1d
 
 from facesynth.inference.efase.bounds import step_bounds
@@ -27,8 +28,8 @@ from facesynth.inference.efase.costs import Query, Weights, all_targets
 from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.search import SearchIndex
 from facesynth.inference.efase.steps import path_cost
-from facesynth.methods.efase.dense import dense_search, transition_matrix
 from facesynth.methods.efase.penalty import median_transition
+from facesynth.methods.efase.torch_search import torch_engine
 
 SEED = 0
 SIZES = (1000, 2000, 4000, 8000, 16000)
@@ -45,7 +46,7 @@ def by_matrix(nodes, weights):
     return lambda targets: dense_search(targets, transitions)
 
 
-ENGINES = {"dense": by_matrix, "numpy": by_numpy}
+ENGINES = {"dense": by_matrix, "numpy": by_numpy, "torch": torch_engine}
 """Each prepares a database and returns what finds the cheapest path by target costs."""
 
 

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import checked_audio
 from .errors import FacesynthError
 
+NEUTRAL = "neutral"
+"""The emotion that intensities lead down to."""
+
 
 @dataclass(frozen=True, eq=False)
 class PhoneTrack:

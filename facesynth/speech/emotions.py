@@ -10,9 +10,8 @@ import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.inference.speech import EmotionTrack
+from facesynth.inference.speech import NEUTRAL, EmotionTrack
 
-NEUTRAL = "neutral"
 _COLUMNS = ("start_s", "end_s", "emotion", "intensity")
 _TOUCHING_S = 1e-6
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
-from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
+from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.audio import load_audio, require_sound
-from facesynth.speech.emotions import NEUTRAL, read_emotions
+from facesynth.speech.emotions import read_emotions
 from facesynth.speech.segments import Segment, covering
 from facesynth.speech.textgrid import read_label_lines, read_textgrid
 

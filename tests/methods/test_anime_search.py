@@ -3,10 +3,21 @@ import itertools
 import numpy as np
 import pytest
 
-from facesynth.inference.anime_graph.search import LookAhead, Step, Weights, best_path, jumps, look_ahead_path, path_cost
+from facesynth.inference.anime_graph.search import (
+    NUMPY,
+    LookAhead,
+    Step,
+    Weights,
+    best_path,
+    jumps,
+    look_ahead_path,
+    path_cost,
+)
 from facesynth.inference.errors import FacesynthError
+from facesynth.methods.anime_graph.torch_search import torch_search
 
 PAPER = Weights()
+ENGINES = {"numpy": NUMPY, "torch": torch_search()}
 
 
 def random_steps(seed, length, *, most=4, dimension=3, chained=0.4):
@@ -37,13 +48,27 @@ def exhaustive(steps, weights):
     return best
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("weights", [PAPER, Weights(2.0, 1.0, 0.01), Weights(0.0, 1.0, 0.0)])
 @pytest.mark.parametrize("seed", range(25))
-def test_equals_exhaustive_enumeration(seed, weights):
+def test_equals_exhaustive_enumeration(seed, weights, engine):
     steps = random_steps(seed, 1 + seed % 6)
-    path, cost = best_path(steps, weights)
+    path, cost = ENGINES[engine].best_path(steps, weights)
     assert cost == pytest.approx(exhaustive(steps, weights), rel=1e-12)
     assert path_cost(steps, path, weights) == pytest.approx(cost, rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("seed", range(5))
+def test_the_mean_over_paths_is_that_of_all_paths(seed, engine):
+    steps, weights, temperature = random_steps(seed, 5), Weights(2.0, 1.0, 0.01), 1.5
+    sums = [np.zeros(len(step.audio)) for step in steps]
+    for path in itertools.product(*(range(len(step.audio)) for step in steps)):
+        share = np.exp(-path_cost(steps, path, weights) / temperature)
+        for total, candidate in zip(sums, path, strict=True):
+            total[candidate] += share
+    for shares, total in zip(ENGINES[engine].soft_path(steps, weights, temperature), sums, strict=True):
+        np.testing.assert_allclose(shares, total / total.sum(), rtol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -18,8 +18,9 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import stretched, time_warp
 from facesynth.methods.efase.learning import tensors
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.registry import load
+from facesynth.motion.search.posterior import posterior
+from facesynth.motion.search.steps import GivenSteps
 
 
 def enumerated(nodes, query, extra, weights, temperature, allowed):
@@ -106,9 +107,9 @@ def test_its_free_energy_is_the_sum_over_all_paths_and_falls_to_the_least_cost()
     for _ in range(5):
         nodes, weights = random_nodes(rng, 6, sentence=3), Weights(3.0)
         query = replace(random_query(rng, nodes, 4), heard=rng.exponential(3.0, (4, 6)))
-        targets = [torch.from_numpy(row) for row in all_targets(nodes, query, weights)]
+        targets = [torch.from_numpy(row)[None] for row in all_targets(nodes, query, weights)]
         terms = tensors(step_terms(nodes, np.arange(6), np.arange(6)))
-        steps = [terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta)] * 3
+        steps = GivenSteps([terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta).mT] * 3)
         every = np.array([path_cost(nodes, query, np.array(path), weights) for path in product(range(6), repeat=4)])
         energies = []
         for temperature in (0.01, 0.5, 5.0):
@@ -171,16 +172,17 @@ def test_many_nodes_are_stretched_like_one(count):
 
 def test_gradients_are_those_of_the_costs():
     rng = np.random.default_rng(6)
-    targets = [torch.from_numpy(rng.normal(size=n)).requires_grad_() for n in (3, 4, 2)]
-    steps = [torch.from_numpy(rng.normal(size=(i, j))).requires_grad_() for i, j in pairwise((3, 4, 2))]
+    targets = [torch.from_numpy(rng.normal(size=(1, n))).requires_grad_() for n in (3, 4, 2)]
+    steps = [torch.from_numpy(rng.normal(size=(1, j, i))).requires_grad_() for i, j in pairwise((3, 4, 2))]
 
     def singles(*costs):
-        return tuple(posterior(costs[:3], costs[3:], 0.7).nodes)
+        return tuple(posterior(costs[:3], GivenSteps(costs[3:]), 0.7).nodes)
 
     assert torch.autograd.gradcheck(singles, (*targets, *steps))
-    found = posterior(targets, steps, 0.7)
-    by_gradient = torch.autograd.grad(-0.7 * found.log_z, [*targets, *steps])
-    for probability, gradient in zip([*found.nodes, *found.steps], by_gradient, strict=True):
+    found = posterior(targets, GivenSteps(steps), 0.7)
+    by_gradient = torch.autograd.grad(-0.7 * found.log_z.sum(), [*targets, *steps])
+    pairs = [found.of_steps(t).mT for t in range(2)]
+    for probability, gradient in zip([*found.nodes, *pairs], by_gradient, strict=True):
         torch.testing.assert_close(probability, gradient)
 
 

@@ -12,11 +12,10 @@ from ..errors import FacesynthError, unknown
 from ..filters import gaussian
 from ..layout import Layout
 from ..motion import Motion
-from ..speech import Speech
+from ..speech import NEUTRAL, Speech
 from .candidates import Maps
 from .graph import Floats
 
-NEUTRAL = "neutral"
 EMOTION_CHANGES_S = 0.08
 """Standard deviation of the smoothing with which mapped emotions come and go."""
 

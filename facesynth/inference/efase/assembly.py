@@ -21,7 +21,6 @@ SETTLE_S = 0.25
 """How long the face takes to its rest pose."""
 WAKE_S = 0.2
 """How long before speech it leaves that pose."""
-NEUTRAL = "neutral"
 """The emotion that weak ones are blended with."""
 SMOOTH_S = 0.08
 """Standard deviation of what intensities of emotion are smoothed with."""

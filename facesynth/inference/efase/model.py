@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..closures import close_lips
-from ..efase.assembly import NEUTRAL, Smoothing, blend, concatenate, joints
+from ..efase.assembly import Smoothing, blend, concatenate, joints
 from ..efase.costs import Query, Weights
 from ..efase.explanation import explain, shares
 from ..efase.hearing import Heard, Hearing
@@ -26,7 +26,7 @@ from ..layout import Layout
 from ..lips import gap, has_lips
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
-from ..speech import Speech, frame_bounds
+from ..speech import NEUTRAL, Speech, frame_bounds
 
 LIP_PHONES = BILABIALS | LABIODENTALS
 """Never said by another viseme class while their own has a node: everybody sees lips that do not close."""

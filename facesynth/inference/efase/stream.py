@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.assembly import NEUTRAL, SETTLE_S, WAKE_S
+from ..efase.assembly import SETTLE_S, WAKE_S
 from ..efase.costs import target_costs
 from ..efase.nodes import Ints
 from ..efase.plan import Plan
@@ -15,7 +15,7 @@ from ..efase.search import Stretch
 from ..errors import FacesynthError
 from ..filters import at_rate
 from ..phones import SILENCE
-from ..speech import frame_bounds
+from ..speech import NEUTRAL, frame_bounds
 
 if TYPE_CHECKING:
     from ..efase.model import Efase

@@ -23,8 +23,9 @@ from facesynth.inference.anime_graph.plan import lay_steps
 from facesynth.inference.anime_graph.search import Weights, step_terms
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
-from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.learn.sharpening import matching_share
+from facesynth.motion.search.posterior import posterior
+from facesynth.motion.search.steps import GivenSteps
 from facesynth.progress import track
 
 if TYPE_CHECKING:
@@ -83,12 +84,11 @@ def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> T
     total, count, values = torch.zeros((), dtype=torch.float64), 0, logs.values()
     for lattice in lattices:
         moves = zip(lattice.jumps, lattice.apart, strict=True)
-        found = posterior(
-            [values["audio_weight"] * a + values["pose_weight"] * p for a, p in zip(lattice.audio, lattice.pose, strict=True)],
-            [values["jump_weight"] * jumps + values["jump_cost_weight"] * apart for jumps, apart in moves],
-            temperature,
-        )
-        means = [torch.tensordot(shares, motion, 1) for shares, motion in zip(found.nodes, lattice.motion, strict=True)]
+        heard = zip(lattice.audio, lattice.pose, strict=True)
+        targets = [(values["audio_weight"] * audio + values["pose_weight"] * pose)[None] for audio, pose in heard]
+        steps = [(values["jump_weight"] * jumps + values["jump_cost_weight"] * apart).mT for jumps, apart in moves]
+        found = posterior(targets, GivenSteps(steps), temperature)
+        means = [torch.tensordot(shares[0], motion, 1) for shares, motion in zip(found.nodes, lattice.motion, strict=True)]
         error, frames = squared_error(torch.cat(means), lattice.truth)
         total, count = total + error, count + frames
     return total / max(count, 1)

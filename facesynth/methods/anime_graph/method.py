@@ -18,7 +18,7 @@ from facesynth.inference.anime_graph.graph import Floats, Graph, Ints
 from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.anime_graph.model import AnimeGraph as Runtime
 from facesynth.inference.anime_graph.plan import Plan, Wish
-from facesynth.inference.anime_graph.search import Weights
+from facesynth.inference.anime_graph.search import NUMPY, Weights
 from facesynth.inference.anime_graph.stream import WishStream
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, narrowest_gaps
@@ -43,6 +43,7 @@ from facesynth.methods.anime_graph.mapping import (
 from facesynth.methods.anime_graph.maps import EmotionMaps, FittedMap
 from facesynth.methods.anime_graph.parallel import Take, emotion_pairs, take_of
 from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_components
+from facesynth.methods.anime_graph.torch_search import torch_search
 from facesynth.methods.capabilities import Account
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.method import Method, Prepared
@@ -232,6 +233,7 @@ class AnimeGraph(Method):
             temperature=config["temperature"],
             sharpening=config["sharpening"],
             help_pairs=config["help_pairs"],
+            search=NUMPY if (device := self.cutoffs_hz.device).type == "cpu" else torch_search(device),
         )
 
     def synthesize(self, speech: Speech, *, seed: int = 0, look_ahead: int | None = None, **options: Any) -> Motion:

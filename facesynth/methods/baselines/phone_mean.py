@@ -13,7 +13,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.inference.motion import Motion
-from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.inference.speech import NEUTRAL, PhoneTrack, Speech
 from facesynth.methods.baselines.capabilities import PHONE_MEAN
 from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
 from facesynth.methods.method import Method
@@ -21,7 +21,6 @@ from facesynth.methods.registry import register
 
 ANY = ""
 """Stands for any emotion."""
-NEUTRAL = "neutral"
 HOLD_S = 0.15
 """The pose of a long phone, a pause above all, is reached this long after its start and left as long before its end, s."""
 

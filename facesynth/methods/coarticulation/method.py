@@ -17,7 +17,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, VISEME_CLASSES
-from facesynth.inference.speech import Speech
+from facesynth.inference.speech import NEUTRAL, Speech
 from facesynth.methods.coarticulation.capabilities import CAPABILITIES
 from facesynth.methods.coarticulation.keys import learn_keys
 from facesynth.methods.coarticulation.recordings import Track, samples_of, track_of, transitions_of, usable
@@ -26,7 +26,6 @@ from facesynth.methods.learn.frames import mean_pose, refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
-NEUTRAL = "neutral"
 
 
 @register(CAPABILITIES)

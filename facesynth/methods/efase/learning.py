@@ -28,9 +28,10 @@ from facesynth.inference.warp import stretched
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
-from facesynth.methods.learn.posterior import posterior
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.motion.resample import resample
+from facesynth.motion.search.posterior import posterior
+from facesynth.motion.search.steps import GivenSteps
 from facesynth.progress import track
 
 NUMBERS = ("pnt", "alpha", "beta", "eta", "gamma", "delta", "phi", "audio_weight", "pose_weight", "temperature")
@@ -141,8 +142,9 @@ def mean_error(lattices: Sequence[Lattice], logs: Logs) -> Tensor:
     weights = {name: values[name] for name in ("pnt", "alpha", "beta", "eta")}
     for lattice in lattices:
         targets = [_target(place, values, logs.factor("sound"), logs.factor("pose")) for place in lattice.places]
-        found = posterior(targets, [step.cost(**weights) for step in lattice.steps], values["temperature"])
-        means = [torch.tensordot(shares, p.motion, 1) for p, shares in zip(lattice.places, found.nodes, strict=True)]
+        steps = GivenSteps([step.cost(**weights).mT for step in lattice.steps])
+        found = posterior([target[None] for target in targets], steps, values["temperature"])
+        means = [torch.tensordot(shares[0], p.motion, 1) for p, shares in zip(lattice.places, found.nodes, strict=True)]
         error, frames = squared_error(torch.cat(means), lattice.truth)
         total, count = total + error, count + frames
     return total / max(count, 1)

@@ -1,6 +1,6 @@
-"""The same search with all transition costs in memory, by matrix products, on any torch device.
+"""Dynamic programming with all transition costs in memory, by matrix products: what the engines are measured against.
 
-Θ(N²) memory: for graphics cards, and as the reference that the sparse search is measured against.
+The matrix takes Θ(N²) memory; it is made in one batch for each length of a phone.
 """
 
 from __future__ import annotations
