@@ -27,7 +27,6 @@ from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
 
-
 @register(CAPABILITIES)
 class Coarticulation(Method):
     """Key shapes of phones, blended by functions of time that were learned from recorded transitions (Deng 2006, §5.2).
