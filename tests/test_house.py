@@ -163,7 +163,6 @@ IMPORTED_AS = {
 NOT_BY_US = {
     "setuptools": "pyworld imports it",
     "facesynth": "its own extras",
-    "optuna": "the parameter search is to use it, or it goes",
 }
 
 
