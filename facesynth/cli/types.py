@@ -27,9 +27,12 @@ class PartType(click.ParamType):
         from facesynth.stage.request import Part
 
         try:
-            return value if isinstance(value, Part) else Part.of(str(value))
+            part = value if isinstance(value, Part) else Part.of(str(value))
+            if part.model is not None and not part.model.is_file():
+                raise FacesynthError("there is no such file")
         except (ValueError, FacesynthError) as error:
             self.fail(f"wanted off, recorded, a factor such as 0.5 or a model's file; got {value!r} ({error})", param, ctx)
+        return part
 
 
 class Fps(click.ParamType):

@@ -154,7 +154,7 @@ def test_silence_and_short_sounds(shop, tmp_path, monkeypatch, capsys):
     [
         (["--emotion", "bored"], "emotion 'bored'"),
         (["--fps", "0"], "wanted a rate"),
-        (["--head", "much"], "off or a factor"),
+        (["--head", "much"], "wanted off, recorded, a factor"),
         (["--size", "12x"], "WIDTHxHEIGHT"),
         (["--constraints", "CONSTRAINTS"], "unknown node"),
         (["--text", "a", "--text-file", "b"], "give one"),
@@ -201,7 +201,7 @@ def test_nan_in_motion_and_a_lone_utterance(tmp_path, monkeypatch, capsys):
 
 
 def test_a_write_that_fails_half_way_leaves_nothing(shop, tmp_path, monkeypatch, capsys):
-    import facesynth.methods.method as module
+    import facesynth.methods.model_file as module
 
     def full_disk(tensors, path, metadata):
         Path(path).write_bytes(b"half")
@@ -214,7 +214,7 @@ def test_a_write_that_fails_half_way_leaves_nothing(shop, tmp_path, monkeypatch,
 
 
 def test_an_interrupted_write_leaves_nothing(shop, tmp_path, monkeypatch):
-    import facesynth.methods.method as module
+    import facesynth.methods.model_file as module
 
     def interrupted(tensors, path, metadata):
         Path(path).write_bytes(b"half")
