@@ -44,6 +44,7 @@ METHODS = {
     "efase": {"audio_weight": 1.0, "pose_weight": 1.0},
     "anime_graph": {"pose_weight": 1.0},
     "coarticulation": {},
+    "eyes": {"patch_s": 0.5},
     "lds": {"deterministic_order": 2, "stochastic_order": 2, "lead_ms": 0.0},
     "mean_face": {},
     "phone_mean": {},

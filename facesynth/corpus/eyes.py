@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import runs
 
 NO_SPEECH = "no speech: there is no sound; kept for eyes and blinks"
@@ -47,7 +48,7 @@ class EyeStats:
 
 def eye_stats(corpus: Corpus) -> EyeStats | None:
     """Count the blinks of every recording with eyes, speech or not; None where there is none."""
-    tracks = list(_tracks(corpus))
+    tracks = [(motion.eyes, silent) for motion, silent in recorded_eyes(corpus) if motion.eyes is not None]
     if not tracks:
         return None
     blinks_s = [length_s for eyes, _ in tracks for length_s in blink_lengths_s(eyes[:, 0], corpus.fps)]
@@ -72,11 +73,11 @@ def blink_lengths_s(opening: NDArray[np.floating], fps: float) -> list[float]:
     return [len(run) / fps for run in shut if len(run) <= LONGEST_BLINK_S * fps and run.start > 0 and run.stop < len(opening)]
 
 
-def _tracks(corpus: Corpus) -> Iterator[tuple[NDArray[np.float32], bool]]:
-    """Eyes [T, 3] of each recording that has them, and whether it is without sound."""
+def recorded_eyes(corpus: Corpus) -> Iterator[tuple[Motion, bool]]:
+    """The raw motion of each recording that has eyes, and whether it is without sound."""
     for record in corpus.records:
         if record.usable or record.reason == NO_SPEECH:
             with suppress(FacesynthError, OSError):
-                eyes = corpus.raw_motion(record.id).eyes
-                if eyes is not None and len(eyes) and np.isfinite(eyes).any():
-                    yield eyes, not record.usable
+                motion = corpus.raw_motion(record.id)
+                if motion.eyes is not None and len(motion) and np.isfinite(motion.eyes).any():
+                    yield motion, not record.usable

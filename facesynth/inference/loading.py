@@ -15,6 +15,7 @@ _MODELS = {
     "efase": ".efase.exported:load_efase",
     "anime_graph": ".anime_graph.exported:load_anime_graph",
     "coarticulation": ".coarticulation.model:load_coarticulation",
+    "eyes": ".eyes:load_eyes",
     "graphs": ".parts:Parts",
 }
 

@@ -103,6 +103,15 @@ class MappingEmotions(Protocol):
 
 
 @runtime_checkable
+class Looking(Protocol):
+    """Moves eyes that know of the head."""
+
+    def look(self, motion: Motion, *, seed: int = 0) -> Motion:
+        """The motion with eyes that go with its head, which may turn further where the eyes look far."""
+        ...
+
+
+@runtime_checkable
 class Streaming(Protocol):
     """Makes motion while the phones arrive."""
 
@@ -117,6 +126,7 @@ WORDS: Mapping[type, tuple[str, str]] = {
     Reporting: ("has no figures of its own", "have some"),
     Joining: ("joins no pieces", "join them"),
     MappingEmotions: ("learns no emotion maps", "learn them"),
+    Looking: ("knows nothing of the head", "do"),
     Streaming: ("makes no motion while the phones arrive", "do"),
 }
 """What a method without an ability does not do, and what those with it do."""

@@ -29,6 +29,7 @@ BUILT_IN = {
         "phone_mean": "baselines.capabilities:PHONE_MEAN",
         "ridge": "baselines.capabilities:RIDGE",
         "coarticulation": "coarticulation.capabilities:CAPABILITIES",
+        "eyes": "eyes.capabilities:CAPABILITIES",
         "lds": "lds.capabilities:CAPABILITIES",
         "tcn": "baselines.capabilities:TCN",
         "anime_graph": "anime_graph.capabilities:CAPABILITIES",

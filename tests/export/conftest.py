@@ -63,6 +63,15 @@ def coarticulation_file(small_corpus, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def eyes_file(tmp_path_factory):
+    from living_eyes import learnt, recording
+
+    path = tmp_path_factory.mktemp("models") / "eyes.safetensors"
+    learnt(recording(seed=1)).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
 def anime_file(small_corpus, tmp_path_factory):
     from facesynth.methods.anime_graph.method import AnimeGraph
 

@@ -1,0 +1,1 @@
+"""Eyes: blinks and gaze, grown from patches of recorded ones."""
