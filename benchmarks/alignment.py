@@ -16,10 +16,11 @@ import numpy as np
 from scipy.io import loadmat
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import SILENCE, normalise_phone, viseme_of
+from facesynth.inference.phones import SILENCE, viseme_of
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import Alignment, align
 from facesynth.speech.audio import load_audio
+from facesynth.speech.phone_labels import normalise_phone
 from facesynth.speech.recognition import recognise
 from facesynth.speech.segments import phone_track
 

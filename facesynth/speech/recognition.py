@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import SILENCE, normalise_phone
+from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
 from facesynth.progress import track
 from facesynth.speech.audio import SILENT_DB, loudest_db, require_sound
 from facesynth.speech.decoding import decode, decoder_sound, heard_time, model_file, new_decoder
 from facesynth.speech.fitting import SLOWNESS, fit_phones
+from facesynth.speech.phone_labels import normalise_phone
 from facesynth.speech.segments import Segment, in_one, phone_track
 from facesynth.speech.transcript import words_of
 

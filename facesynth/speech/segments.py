@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import CLOSURES, SILENCE, normalise_phone
+from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
+from facesynth.speech.phone_labels import CLOSURES, normalise_phone, notation_of
 
 Segment = tuple[str, float, float]
 """Label, start and end in seconds."""
@@ -26,10 +27,11 @@ def phone_track(segments: Iterable[Segment], duration_s: float | None = None) ->
     """
     whole = list(_filled(segments, duration_s))
     raw = [label.strip().lower() for label, _ in whole]
+    notation = notation_of(label for label, _ in whole)
     labels: list[str] = []
     ends_s: list[float] = []
     for number, (label, end_s) in enumerate(whole):
-        phone = normalise_phone(label)
+        phone = normalise_phone(label, notation)
         if labels and (phone == labels[-1] == SILENCE or _is_release(raw[number - 1], phone)):
             labels[-1], ends_s[-1] = phone, end_s
         else:

@@ -2,56 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from facesynth.atomic import atomic_path, write_text
+from facesynth.atomic import write_text
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
-from facesynth.speech.segments import Segment, phone_track, segments_of
+from facesynth.speech.phone_labels import label_remarks
+from facesynth.speech.praat import decoded, read_grid
+from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of
+from facesynth.speech.tiers import following, tiers_of
 
 Words = tuple[Segment, ...]
 """Word, start and end in seconds; silence between words is left out."""
+SAME_LENGTH_S = 0.2
+"""A stretch of labels and a sound whose lengths differ by no more are of the same thing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """What a file says of a sound."""
+
+    phones: PhoneTrack
+    words: Words
+    remarks: tuple[str, ...]
+    """What was assumed or mended, for a person."""
+
+
+def read_labelled(path: str | Path, duration_s: float | None = None, speaker: str | None = None) -> Labelled:
+    """Phones and words of a TextGrid, or phones of lines of `end label`, with what was assumed or mended.
+
+    duration_s: length of the sound, by which times that were kept from a longer file are seen; speaker: whose phones.
+    FacesynthError where they cannot be used.
+    """
+    path = Path(path)
+    if not is_textgrid(path):
+        return _from_lines(path, duration_s)
+    grid = read_grid(path)
+    phones, words, remarks = tiers_of(grid, path, speaker)
+    begin_s = _offset_s(grid.start_s, grid.end_s, duration_s)
+    segments, mended = following(_shifted(phones.intervals, begin_s))
+    said = following(_shifted(words.intervals if words else (), begin_s))[0]
+    spoken = tuple((word.strip(), start_s, end_s) for word, start_s, end_s in said if not is_silence_mark(word))
+    track = _track(path, segments, grid.end_s - begin_s)
+    labels = label_remarks(label for label, _, _ in segments)
+    told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels)
+    return Labelled(track, spoken, told)
+
+
+def is_textgrid(path: str | Path) -> bool:
+    """Whether a file of phones is a TextGrid by its name; else it is lines of `end label`."""
+    return Path(path).suffix.lower() in (".textgrid", ".json")
 
 
 def read_textgrid(path: str | Path) -> tuple[PhoneTrack, Words]:
-    """Phones and words of a TextGrid (long, short or JSON) with a tier `phones` and, if there is one, `words`.
+    """Phones and words of a TextGrid (long, short, binary or JSON) with a tier `phones` and, if there is one, `words`.
 
     Names are matched loosely (`Phones`, `speaker - phones`, `word`); gaps in the tier of phones become silence;
     words that are empty or silence marks are left out. FacesynthError for anything else.
     """
-    grid = _opened(Path(path))
-    phones, words = _tier(grid, "phone"), _tier(grid, "word")
-    if phones is None:
-        raise FacesynthError(
-            f"{path} has no tier of intervals named 'phones'; its tiers are {', '.join(grid.tierNames) or 'none'}"
-        )
-    try:
-        track = phone_track(_segments(phones), float(grid.maxTimestamp))
-    except FacesynthError as error:
-        raise FacesynthError(f"{path}: {error}") from None
-    return track, () if words is None else tuple(entry for entry in _segments(words) if not is_silence_mark(entry[0]))
+    found = read_labelled(path)
+    return found.phones, found.words
 
 
 def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment] = ()) -> None:
     """Write tiers `words` and `phones` as a TextGrid (long form, UTF-8), atomically; `read_textgrid` gives the same back."""
-    from praatio.data_classes.interval_tier import IntervalTier
-    from praatio.data_classes.textgrid import Textgrid
-
     end_s = phones.duration_s
-    grid = Textgrid()
-    grid.addTier(IntervalTier("words", [(start, min(end, end_s), word) for word, start, end in words], 0, end_s))
-    grid.addTier(IntervalTier("phones", [(start, end, label) for label, start, end in segments_of(phones)], 0, end_s))
-    with atomic_path(path) as part:
-        grid.save(str(part), format="long_textgrid", includeBlankSpaces=True, minimumIntervalLength=None)
+    said = [(word, start_s, min(stop_s, end_s)) for word, start_s, stop_s in words]
+    tiers = {"words": list(_without_gaps(said, end_s)), "phones": segments_of(phones)}
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0 ", f"xmax = {_number(end_s)} "]
+    lines += ["tiers? <exists> ", f"size = {len(tiers)} ", "item []: "]
+    for number, (name, segments) in enumerate(tiers.items(), start=1):
+        about = ['class = "IntervalTier" ', f'name = "{name}" ', "xmin = 0 ", f"xmax = {_number(end_s)} "]
+        lines += [f"    item [{number}]:", *(f"        {line}" for line in about)]
+        lines.append(f"        intervals: size = {len(segments)} ")
+        for index, (label, start_s, stop_s) in enumerate(segments, start=1):
+            text = label.strip().replace('"', '""')
+            values = [f"xmin = {_number(start_s)} ", f"xmax = {_number(stop_s)} ", f'text = "{text}" ']
+            lines += [f"        intervals [{index}]:", *(f"            {value}" for value in values)]
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def read_label_lines(path: str | Path) -> PhoneTrack:
     """Phones from lines of `end label` or `start end label`, times in seconds; empty lines and `#` comments are passed over."""
+    return _from_lines(Path(path), None).phones
+
+
+def _from_lines(path: Path, duration_s: float | None) -> Labelled:
+    segments, encoding = _line_segments(path)
+    start_s, end_s = (segments[0][1], segments[-1][2]) if segments else (0.0, 0.0)
+    begin_s = _offset_s(start_s, end_s, duration_s)
+    labels = label_remarks(label for label, _, _ in segments)
+    return Labelled(_track(path, _shifted(segments, begin_s), None), (), (*_encoded(encoding), *_moved(begin_s), *labels))
+
+
+def _line_segments(path: Path) -> tuple[list[Segment], str]:
+    """The segments of a file of lines, and its encoding where that had to be guessed."""
     segments: list[Segment] = []
-    for number, line in _lines(Path(path)):
+    text, encoding = _text_of(path)
+    for number, line in _lines(text):
         before_s = segments[-1][2] if segments else 0.0
         try:
             *times, label = line.split()
@@ -64,10 +115,53 @@ def read_label_lines(path: str | Path) -> PhoneTrack:
                 f" with times that go on from {before_s:g} s"
             ) from None
         segments.append((label, start_s, end_s))
+    return segments, encoding
+
+
+# A stretch that was cut out of a longer file may keep its times there: then it is as long as the sound, but does not lie in it.
+def _offset_s(start_s: float, end_s: float, duration_s: float | None) -> float:
+    """Seconds to take off all times; 0 where they are those of the sound."""
+    if duration_s is None or abs(start_s) <= TOUCHING_S:
+        return 0.0
+    beside_s = abs(end_s - start_s - duration_s)
+    return start_s if beside_s <= SAME_LENGTH_S and beside_s < abs(end_s - duration_s) else 0.0
+
+
+def _shifted(segments: Iterable[Segment], begin_s: float) -> list[Segment]:
+    return [(label, start_s - begin_s, end_s - begin_s) for label, start_s, end_s in segments]
+
+
+def _encoded(encoding: str) -> tuple[str, ...]:
+    return (f"it is not UTF-8; it was read as {encoding}",) if encoding else ()
+
+
+def _moved(begin_s: float) -> tuple[str, ...]:
+    return (f"its times begin at {begin_s:g} s, as in a longer file; they were counted from 0",) if begin_s else ()
+
+
+def _track(path: Path, segments: Iterable[Segment], end_s: float | None) -> PhoneTrack:
     try:
-        return phone_track(segments)
+        return phone_track(segments, end_s)
     except FacesynthError as error:
         raise FacesynthError(f"{path}: {error}") from None
+
+
+def _without_gaps(segments: Iterable[Segment], end_s: float) -> Iterator[Segment]:
+    """Segments with an empty one wherever time is left over."""
+    now_s = 0.0
+    for label, start_s, stop_s in segments:
+        if start_s > now_s:
+            yield "", now_s, start_s
+        if stop_s > max(start_s, now_s):
+            yield label, max(start_s, now_s), stop_s
+            now_s = stop_s
+    if end_s > now_s:
+        yield "", now_s, end_s
+
+
+def _number(seconds: float) -> str:
+    """The shortest digits that give the same number back."""
+    return f"{seconds:.0f}" if abs(seconds - int(seconds)) <= 1e-14 * abs(seconds) else repr(float(seconds))
 
 
 def write_label_lines(path: str | Path, phones: PhoneTrack) -> None:
@@ -75,43 +169,21 @@ def write_label_lines(path: str | Path, phones: PhoneTrack) -> None:
     write_text(path, "".join(f"{end_s:.6f} {label}\n" for label, _, end_s in segments_of(phones)))
 
 
-def _opened(path: Path) -> Any:
-    from praatio import textgrid
-    from praatio.utilities.errors import PraatioException
-
-    if not path.is_file():
-        raise FacesynthError(f"{path}: no such TextGrid")
-    try:
-        return textgrid.openTextgrid(str(path), includeEmptyIntervals=True, reportingMode="silence", duplicateNamesMode="rename")
-    except (PraatioException, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise FacesynthError(f"{path} is not a TextGrid that Praat would read ({error})") from None
-
-
-def _tier(grid: Any, kind: str) -> Any:
-    """The tier of intervals called `kind`s, else the first whose name contains `kind`, else None."""
-    from praatio.data_classes.interval_tier import IntervalTier
-
-    named = [name for name in grid.tierNames if kind in name.lower() and isinstance(grid.getTier(name), IntervalTier)]
-    best = sorted(named, key=lambda name: name.lower() not in (kind, f"{kind}s"))
-    return grid.getTier(best[0]) if best else None
-
-
-def _segments(tier: Any) -> Iterable[Segment]:
-    return ((entry.label, float(entry.start), float(entry.end)) for entry in tier.entries)
-
-
 def is_silence_mark(word: str) -> bool:
     """Whether an aligner's word stands for none: `sil`, `sp`, empty and the like."""
-    return word.strip().lower() in {"", "sp", "sil", "<sil>", "<eps>", "spn", "h#", "<p:>", "#", SILENCE}
+    return word.strip().lower() in {"", "sp", "sil", "<sil>", "<eps>", "spn", "<unk>", "h#", "<p:>", "#", SILENCE}
 
 
-def _lines(path: Path) -> Iterable[tuple[int, str]]:
-    """Number and text of each line that says something."""
+def _text_of(path: Path) -> tuple[str, str]:
     if not path.is_file():
         raise FacesynthError(f"{path}: no such file of phones")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return decoded(path.read_bytes())
     except UnicodeDecodeError:
         raise FacesynthError(f"{path} is not text in UTF-8; expected lines of `end label`") from None
+
+
+def _lines(text: str) -> Iterable[tuple[int, str]]:
+    """Number and text of each line that says something."""
     stripped = ((number, line.strip()) for number, line in enumerate(text.splitlines(), start=1))
     return ((number, line) for number, line in stripped if line and not line.startswith("#"))

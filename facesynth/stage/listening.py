@@ -61,11 +61,17 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         phones = grid if grid.exists() else None
         text = read_text(words) if phones is None and words.exists() else None
     if cast.detector is not None:
-        heard = hear(recording, text=text, phones_path=phones)
+        heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker)
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
     emotion = request.emotion or (None if request.emotions else cast.mouth.emotions[0])
     return hear(
-        recording, text=text, phones_path=phones, emotion=emotion, emotions_path=request.emotions, intensity=request.intensity
+        recording,
+        text=text,
+        phones_path=phones,
+        speaker=request.speaker,
+        emotion=emotion,
+        emotions_path=request.emotions,
+        intensity=request.intensity,
     )
 
 

@@ -71,6 +71,8 @@ class Request:
     """What is said."""
     phones: Path | None = None
     """A TextGrid, or lines of `end label`."""
+    speaker: str | None = None
+    """Whose phones are taken, where a TextGrid holds those of several."""
     emotion: str | None = None
     """One for everything, or AUTO."""
     emotions: str | Path | None = None

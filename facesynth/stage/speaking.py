@@ -91,6 +91,7 @@ class Production:
         written += _phones_beside(targets, heard, remark)
         facts |= {"speech": str(recording), "duration_s": heard.speech.duration_s, "phones": heard.source}
         facts["written"] = [str(path) for path in written]
+        facts["remarks"] = list(remarks)
         return Spoken(heard.speech, motion, tuple(written), facts, tuple(remarks))
 
     def _account(self, speech: Speech, options: Mapping[str, Any], remark: Tell) -> dict[str, Any]:

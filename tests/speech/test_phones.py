@@ -8,9 +8,9 @@ from facesynth.inference.phones import (
     PHONES,
     VISEME_CLASSES,
     VOWELS,
-    normalise_phone,
     viseme_of,
 )
+from facesynth.speech.phone_labels import normalise_phone
 
 
 def test_fifteen_classes_that_share_no_phone():

@@ -35,6 +35,8 @@ class Given:
         recording = self.recording
         files = {"sound": recording.sound, "motion": recording.motion, "phones": recording.phones, "emotions": recording.emotions}
         prints = {part: hash_file(path)[:DIGITS] for part, path in files.items() if path is not None}
+        if recording.phones is not None and recording.speaker is not None:
+            prints["phones"] = _short(f"{prints['phones']} {recording.speaker}")
         facts = {name: cell(value) for name, value in self.facts.items()}
         facts |= {"face": str(self.face)} if self.face is not None else {}
         facts[FOLDER] = recording.motion.resolve().parent.name

@@ -114,7 +114,7 @@ def _new(corpus: Corpus, given: Given) -> Prepared:
     record = Record(**{**given.facts, "id": given.id})
     _require_emotion(corpus, record, given.recording)
     take = _captured(corpus, given.recording, given.face)
-    heard = _heard(take, record, given.recording.phones)
+    heard = _heard(take, record, given.recording)
     emotions = _emotions(corpus, record, given.recording, take.duration_s)
     record = _accounted(record, given, "", take, heard)
     speech = Speech(take.audio, take.sample_rate, heard.speech.phones, emotions, record.text)
@@ -145,7 +145,7 @@ def _again(corpus: Corpus, old: Record, given: Given, changed: frozenset[str], r
     take = _captured(corpus, recording, given.face) if captures else _stored(corpus, old)
     heard = None
     if respoken or "sound" in changed or "phones" in changed | lost:
-        heard = _heard(take, _to_hear(record, given), recording.phones)
+        heard = _heard(take, _to_hear(record, given), recording)
     kept = ""
     if heard is not None and not replacing and _is_by_hand(corpus, old, heard):
         if "sound" in changed:
@@ -213,11 +213,12 @@ def _to_hear(record: Record, given: Given) -> Record:
     return record if said or given.recording.phones is None else replace(record, text="")
 
 
-def _heard(take: _Take, record: Record, phones: Path | None) -> Heard:
+def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
     """The phones of what the corpus will hold, so that aligning it later gives the same."""
     from facesynth.speech.hearing import hear_sound
 
-    return hear_sound(take.stored, take.sample_rate, text=record.text or None, phones_path=phones)
+    text = record.text or None
+    return hear_sound(take.stored, take.sample_rate, text=text, phones_path=recording.phones, speaker=recording.speaker)
 
 
 def _is_aligned(heard: Heard | None) -> bool:

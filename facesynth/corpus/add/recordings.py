@@ -46,6 +46,8 @@ class Recording:
     phones: Path | None = None
     text: Path | None = None
     emotions: Path | None = None
+    speaker: str | None = None
+    """Whose phones are taken, where their file holds those of several."""
 
 
 def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:
@@ -73,7 +75,9 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
         if fault:
             refused[name] = fault
         else:
-            recordings.append(Recording(name, **{kind: files[0] for kind, files in group.items()}))
+            first = {kind: files[0] for kind, files in group.items()}
+            phones, text, emotions = (first.get(kind) for kind in ("phones", "text", "emotions"))
+            recordings.append(Recording(name, first["sound"], first["motion"], phones, text, emotions))
     return recordings, refused
 
 

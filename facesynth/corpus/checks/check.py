@@ -20,7 +20,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio, require_sound
-from facesynth.speech.textgrid import read_textgrid
+from facesynth.speech.textgrid import read_labelled
 
 
 def check(corpus: Corpus | str | Path, methods: Sequence[needs.Need] = ()) -> list[Problem]:
@@ -63,9 +63,10 @@ def _utterance_problems(files: Files, header: Header, record: Record) -> tuple[l
     sound_s = attempt(
         problems, f"audio/{name}.wav", "restore it, or mark the utterance unusable", lambda: _sound_s(files.audio(name))
     )
-    phones = attempt(
-        problems, f"phones/{name}.TextGrid", "mend it in Praat, or align it again", lambda: read_textgrid(files.phones(name))[0]
-    )
+    grid = f"phones/{name}.TextGrid"
+    said = attempt(problems, grid, "mend it in Praat, or align it again", lambda: read_labelled(files.phones(name), sound_s))
+    problems += [Problem(grid, remark, "correct it if that is not meant", grave=False) for remark in said.remarks] if said else []
+    phones = said.phones if said else None
     motion = attempt(
         problems, f"motion/{name}.npz", "restore it, or add the recording again", lambda: read_motion(files.motion(name), header)
     )

@@ -1,0 +1,143 @@
+"""TextGrids that Praat reads and others refuse: overlaps of rounding, intervals of no length, encodings, all of its forms."""
+
+import numpy as np
+import pytest
+from bringing import added, corpus_of, lay_down, run, spoken
+from grids import PHONES, WORDS, binary_grid, chronological_grid, json_grid, long_grid, put, short_grid
+
+from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
+from facesynth.speech.praat import read_grid
+from facesynth.speech.textgrid import read_labelled
+
+FORMS = {"long": long_grid, "short": short_grid, "chronological": chronological_grid, "binary": binary_grid, "json": json_grid}
+ENDS = [0.2, 0.5, 0.7, 0.9, 1.0]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_says_the_same(tmp_path, talker, form):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    path = tmp_path / ("a.json" if form == "json" else "a.TextGrid")
+    put(path, FORMS[form]([("words", [("Łódź", 0.2, 0.7)]), ("phones", PHONES)]))
+    found = read_labelled(path, 1.0)
+    assert found.phones.labels == ("pau", "aa", "p", "ae", "pau")
+    assert found.words == (("Łódź", 0.2, 0.7),)
+    assert found.remarks == ()
+    assert spoken(talker, sound, tmp_path, "--phones", path)[0]["mouthClose"].max() > 0.4
+
+
+@pytest.mark.parametrize("overlap_s", [1e-7, 1e-4, 0.004])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_small_overlap_is_one_boundary(tmp_path, form, overlap_s):
+    corpus, sound = corpus_of(tmp_path), lay_down(tmp_path / "session", "a", 1.0)
+    tier = [(label, start - overlap_s * (start > 0), end) for label, start, end in PHONES]
+    path = put(tmp_path / ("a.json" if form == "json" else "a.TextGrid"), FORMS[form]([("phones", tier)]))
+    report, account = added(corpus, sound, sound.with_suffix(".npz"), "--phones", path)
+    assert "4 intervals overlap" in report["remarks"]["a"][0]
+    assert "4 intervals overlap" in account
+    np.testing.assert_allclose(Corpus.open(corpus)["a"].speech.phones.ends_s, ENDS, atol=overlap_s)
+
+
+def test_an_overlap_that_is_no_rounding_is_refused_by_its_place(tmp_path, talker):
+    tier = [("AA", 0.0, 0.5), ("P", 0.3, 0.7), ("AA", 0.7, 1.0)]
+    sound, path = lay_down(tmp_path / "s", "a", 1.0), put(tmp_path / "a.TextGrid", long_grid([("phones", tier)]))
+    code, _, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--phones", path)
+    assert (code, "segment 2 ('P') lies at 0.3 to 0.7 s" in said) == (2, True)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_intervals_of_no_length_are_left_out_and_told(tmp_path, talker, form):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    tier = [*PHONES[:3], ("sp", 0.7, 0.7), *PHONES[3:], ("sp", 1.0, 1.0)]
+    path = put(tmp_path / ("a.json" if form == "json" else "a.TextGrid"), FORMS[form]([("phones", tier)]))
+    curves, facts = spoken(talker, sound, tmp_path, "--phones", path)
+    assert any("2 intervals of no length were left out (sp)" in line for line in facts["remarks"])
+    assert curves["mouthClose"].max() > 0.4
+
+
+@pytest.mark.parametrize(
+    ("encoding", "told"),
+    [
+        ("latin-1", "Latin-1"),
+        ("mac_roman", "MacRoman"),
+        ("utf-16-le", "UTF-16 without"),
+        ("utf-16-be", "UTF-16 without"),
+        ("utf-16", ""),
+        ("utf-8-sig", ""),
+        ("utf-8", ""),
+    ],
+)
+@pytest.mark.parametrize("word", ["déjà vu", "Größe", "señora", "Überraschung", "ça été"])
+@pytest.mark.parametrize("make", [long_grid, short_grid])
+def test_words_in_any_encoding(tmp_path, encoding, told, word, make):
+    path = put(tmp_path / "a.TextGrid", make([("words", [(word, 0.2, 0.7)]), ("phones", PHONES)]), encoding)
+    found = read_labelled(path, 1.0)
+    assert found.words[0][0] == word
+    assert bool(told) == bool(found.remarks)
+    assert not told or told in found.remarks[0]
+
+
+def test_an_encoding_is_told_on_import(tmp_path):
+    corpus, sound = corpus_of(tmp_path), lay_down(tmp_path / "session", "a", 1.0)
+    put(sound.with_suffix(".TextGrid"), long_grid([("words", [("öp", 0.2, 0.7), *WORDS[1:]]), ("phones", PHONES)]), "mac_roman")
+    report, account = added(corpus, tmp_path / "session")
+    assert "read as MacRoman" in report["remarks"]["a"][0]
+    assert "read as MacRoman" in account
+    assert Corpus.open(corpus)["a"].speech.text == "öp a"
+
+
+def test_points_beside_intervals_are_passed_over_and_alone_are_no_phones(tmp_path, talker):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    points = ("tones", [("H*", 0.3, 0.3)])
+    path = put(tmp_path / "a.TextGrid", long_grid([points, ("phones", PHONES)], points=("tones",)))
+    assert spoken(talker, sound, tmp_path, "--phones", path)[0]["mouthClose"].max() > 0.4
+    put(path, long_grid([("phones", PHONES), points], points=("phones", "tones")))
+    code, _, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--phones", path)
+    assert (code, "tier of points" in said) == (2, True)
+
+
+def test_line_ends_remarks_and_praats_signs_for_letters(tmp_path):
+    tier = [(r"\sw", 0.0, 0.3), (r"\sh", 0.3, 0.6), (r"i\:f", 0.6, 1.0)]
+    text = long_grid([("phones", tier)]).replace("\n", "\r\n").replace("xmin = 0.0 ", "xmin = 0.0 ! where it begins", 1)
+    found = read_labelled(put(tmp_path / "a.TextGrid", text), 1.0)
+    assert found.phones.labels == ("ax", "sh", "iy")
+    assert read_labelled(put(tmp_path / "a.TextGrid", text.replace("\r\n", "\r")), 1.0).phones.labels == ("ax", "sh", "iy")
+
+
+@pytest.mark.parametrize("trials", [100, pytest.param(2000, marks=pytest.mark.slow)])
+def test_damaged_grids_are_right_or_one_clear_line(tmp_path, trials):
+    """A valid file of each form, then one thing changed: a value, a count, a name, a byte, the end."""
+    rng, read = np.random.default_rng(5), 0
+    wrong = ["", "-1", "1e999", "nan", '"', "<absent>", "99999999999", "0.5.5", "\\", "\x00", "é", "{", "[]", '"TextTier"']
+    for trial in range(trials):
+        form = list(FORMS)[trial % len(FORMS)]
+        content = FORMS[form]([("words", WORDS), ("A - phones", PHONES)])
+        whole = content if isinstance(content, bytes) else content.encode(["utf-8", "utf-16", "utf-16-le"][trial // 5 % 3])
+        if trial % 3 == 0:
+            hurt = bytearray(whole)
+            for place in rng.integers(0, len(hurt), rng.integers(1, 4)):
+                hurt[place] = rng.integers(256)
+        elif trial % 3 == 1 or isinstance(content, bytes):
+            hurt = bytearray(whole[: rng.integers(0, len(whole))])
+        else:
+            parts = content.split(" ")
+            parts[rng.integers(len(parts))] = wrong[rng.integers(len(wrong))]
+            hurt = bytearray(" ".join(parts).encode())
+        path = put(tmp_path / ("a.json" if form == "json" else "a.TextGrid"), bytes(hurt))
+        try:
+            found = read_labelled(path, 1.0)
+            assert np.isfinite(found.phones.ends_s).all()
+            read += 1
+        except FacesynthError as error:
+            assert "\n" not in str(error)
+            assert len(str(error)) < 400 + len(str(path))
+    assert 0.05 * trials < read < 0.95 * trials
+
+
+def test_a_grid_without_tiers_and_what_is_none(tmp_path):
+    empty = put(tmp_path / "a.TextGrid", 'File type = "ooTextFile"\nObject class = "TextGrid"\n\n0\n1\n<absent>\n')
+    assert read_grid(empty).tiers == ()
+    with pytest.raises(FacesynthError, match="its tiers are none"):
+        read_labelled(empty)
+    with pytest.raises(FacesynthError, match="not a TextGrid"):
+        read_labelled(put(tmp_path / "b.TextGrid", "hello\n"))
