@@ -16,6 +16,8 @@ _MODELS = {
     "anime_graph": ".anime_graph.exported:load_anime_graph",
     "coarticulation": ".coarticulation.model:load_coarticulation",
     "eyes": ".eyes:load_eyes",
+    "head_knn": ".head.exported:load_head_knn",
+    "head_hmm": ".head.exported:load_head_hmm",
     "graphs": ".parts:Parts",
 }
 

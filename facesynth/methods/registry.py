@@ -31,6 +31,8 @@ BUILT_IN = {
         "coarticulation": "coarticulation.capabilities:CAPABILITIES",
         "eyes": "eyes.capabilities:CAPABILITIES",
         "lds": "lds.capabilities:CAPABILITIES",
+        "head_knn": "head_knn.capabilities:CAPABILITIES",
+        "head_hmm": "head_hmm.capabilities:CAPABILITIES",
         "tcn": "baselines.capabilities:TCN",
         "anime_graph": "anime_graph.capabilities:CAPABILITIES",
         "efase": "efase.capabilities:CAPABILITIES",
