@@ -16,7 +16,7 @@ from facesynth.speech.audio import require_sound
 from facesynth.speech.fitting import Fitted, fit_phones, fit_words
 from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
 from facesynth.speech.segments import Segment, in_one, phone_track
-from facesynth.speech.transcript import words_of
+from facesynth.speech.transcript import left_out, words_of
 
 WORST_FIT = -85.0
 """Fit below which the transcript is taken to be another sound's. Of 87 real clips in eight emotions with their own
@@ -71,7 +71,7 @@ def align(audio: NDArray[np.float32], rate: int, text: str) -> Alignment:
     phones = in_one((*span, found.phones) for span, found in zip(spans, whole, strict=True))
     spoken = in_one((*span, found.words) for span, found in zip(spans, whole, strict=True))
     starts_s = [start_s for start_s, _ in spans]
-    warnings = (*_guessed_words(words), *_doubtful(whole, starts_s))
+    warnings = (*_not_said(text), *_guessed_words(words), *_doubtful(whole, starts_s))
     return Alignment(phone_track(phones, len(audio) / rate), tuple(spoken), warnings, fit)
 
 
@@ -113,6 +113,11 @@ def _mismatch(text: str, reason: str = "its words are not heard to the end") -> 
         f"the transcript {_quoted(text)} does not match the sound ({reason});"
         " correct the transcript, or leave it out to have the phones recognised"
     )
+
+
+def _not_said(text: str) -> list[str]:
+    directions = left_out(text)
+    return [f"left out of the transcript as directions: {', '.join(directions)}"] if directions else []
 
 
 def _guessed_words(words: Sequence[str]) -> list[str]:

@@ -3,97 +3,83 @@
 from __future__ import annotations
 
 import re
-import unicodedata
-from functools import cache
-from typing import Any
 
+from facesynth.speech.directions import without_directions
+from facesynth.speech.folding import cleaned, folded
+from facesynth.speech.numbers_said import numbers_written_out, romans_written_out
 from facesynth.speech.pronunciation import is_known
 
 _ABBREVIATIONS = {
     **{"mr": "mister", "mrs": "missus", "ms": "miz", "dr": "doctor", "prof": "professor", "st": "saint", "jr": "junior"},
     **{"sr": "senior", "vs": "versus", "etc": "et cetera", "e.g": "for example", "i.e": "that is", "approx": "approximately"},
-    **{"no": "number", "vol": "volume", "fig": "figure", "dept": "department", "est": "established", "inc": "incorporated"},
-    **{"ltd": "limited", "co": "company", "gen": "general", "sgt": "sergeant", "capt": "captain", "hon": "honorable"},
+    **{"no": "number", "nos": "numbers", "vol": "volume", "fig": "figure", "dept": "department", "est": "established"},
+    **{"ltd": "limited", "co": "company", "corp": "corporation", "inc": "incorporated", "gen": "general", "sgt": "sergeant"},
+    **{"capt": "captain", "lt": "lieutenant", "col": "colonel", "rev": "reverend", "hon": "honorable", "gov": "governor"},
+    **{"sen": "senator", "rep": "representative", "pres": "president", "mt": "mount", "ft": "fort", "ave": "avenue"},
+    **{"blvd": "boulevard", "rd": "road", "ln": "lane", "hwy": "highway", "apt": "apartment", "min": "minutes", "max": "maximum"},
+    **{"pp": "pages", "p": "page", "ch": "chapter", "al": "al", "ph.d": "p h d", "cf": "compare", "tel": "telephone"},
+    **{"jan": "january", "feb": "february", "aug": "august", "sept": "september", "oct": "october", "nov": "november"},
+    **{"dec": "december", "mon": "monday", "tue": "tuesday", "tues": "tuesday", "thu": "thursday", "thurs": "thursday"},
+    **{"fri": "friday", "a.k.a": "also known as", "asst": "assistant", "bros": "brothers"},
 }
-_ONLY_BEFORE_A_NUMBER = {"no", "vol", "fig"}
-_SIGNS = {"&": "and", "%": "percent", "@": "at", "+": "plus", "=": "equals", "°": "degrees", "#": "number"}
-_CURRENCIES = {"$": ("dollar", "cent"), "£": ("pound", "penny"), "€": ("euro", "cent"), "¥": ("yen", "sen")}
-_NUMBER = r"\d+(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?"
+_ONLY_BEFORE_A_NUMBER = frozenset({"no", "nos", "vol", "fig", "p", "pp", "ch"})
+_ONLY_BEFORE_A_NAME = frozenset({"gen", "col", "rev", "hon", "gov", "sen", "rep", "pres", "mt", "ft", "lt", "st", "mon", "fri"})
+_UNITS = frozenset({"ms", "ft", "min", "p"})
+"""Measures, where they follow a number."""
+_TITLES = re.compile(r"\b(Mr|Mrs|Ms|Dr|Prof|St|Jr|Sr|Sgt|Capt)(?=\s+[A-Z])")
+_STREET = re.compile(r"(?<=[a-z]\s)(St|Dr)\b\.?(?=\s*(?:[,;.!?]|$|[a-z]|\d))")
+_SIGNS = {"&": "and", "%": "percent", "@": "at", "+": "plus", "=": "equals", "°": "degrees", "#": "number", "№": "number"}
+_SIGNS |= {"×": "times", "÷": "divided by", "±": "plus or minus", "~": "about", "≈": "about", "§": "section"}
+_SIGNS |= {"≤": "at most", "≥": "at least"}
+_SPELT = frozenset({"US"})
+"""Short forms that are words as well."""
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """The words said in a text, lower case, only a to z and apostrophes inside; numbers, sums of money, times and
-    usual abbreviations are written out, hyphens part words, short unknown words in capitals are spelt.
+    """The words said in a text, lower case, only a to z and apostrophes inside; numbers, money, dates, times, measures and
+    usual abbreviations are written out, hyphens part words, short unknown words in capitals are spelt, letters of other
+    alphabets become the nearest of a to z, and directions such as `[music]` or `(laughs)` are left out.
     """
-    plain = unicodedata.normalize("NFKC", text).replace("\u2019", "'").replace("\u2018", "'").replace("\u02bc", "'")
-    plain = "".join(letter for letter in unicodedata.normalize("NFKD", plain) if not unicodedata.combining(letter))
-    plain = _numbers_written_out(_abbreviations_written_out(plain))
+    plain = without_directions(cleaned(text))[0]
+    shouted = plain.upper() == plain
+    plain = _abbreviations_written_out(_addresses_written_out(plain))
+    plain = numbers_written_out(romans_written_out(plain))
     for sign, word in _SIGNS.items():
         plain = plain.replace(sign, f" {word} ")
-    shouted = plain.upper() == plain
+    plain = folded(plain)
     tokens = re.findall(r"[A-Za-z]+(?:'[A-Za-z]+)*'?|'[A-Za-z]+", plain)
     return tuple(word for token in tokens for word in _spelt(token, shouted))
 
 
+def left_out(text: str) -> tuple[str, ...]:
+    """What of a text is not said: directions such as `[music]` or `(laughs)`."""
+    return without_directions(cleaned(text))[1]
+
+
+def _addresses_written_out(text: str) -> str:
+    text = re.sub(r"(?<=\w)@(?=\w)", " at ", text)
+    return re.sub(r"(?<=\w)\.(com|org|net|edu|gov|io|co|uk|de|fr|eu|ai|tv)\b(?!\.?\w)", r" dot \1 ", text)
+
+
 def _abbreviations_written_out(text: str) -> str:
     def full(match: re.Match[str]) -> str:
-        short = match[1].lower()
-        if short in _ONLY_BEFORE_A_NUMBER and not re.match(r"\s*\d", match.string[match.end() :]):
+        short, following = match[1].lower(), match.string[match.end() :]
+        if short in _UNITS and re.search(r"\d\s?$", match.string[: match.start()]):
+            return match[0].rstrip(".")
+        if short in _ONLY_BEFORE_A_NUMBER and not re.match(r"\s*[\dIVX]", following):
+            return match[0]
+        if short in _ONLY_BEFORE_A_NAME and not re.match(r"\s*[A-Z]", following):
             return match[0]
         return _ABBREVIATIONS[short]
 
+    text = _STREET.sub(lambda match: {"St": "street", "Dr": "drive"}[match[1]], text)
+    text = _TITLES.sub(lambda match: _ABBREVIATIONS[match[1].lower()], text)
+    text = re.sub(r"(?<!\w)w/(?=\s?\w)", "with ", re.sub(r"(?<!\w)w/o\b", "without", text))
+    text = re.sub(r"\bN[º°]\s?(?=\d)", "number ", text)
+    text = re.sub(r"\b([ap])\.\s?m\.", r"\1m", text, flags=re.IGNORECASE)
     short_forms = "|".join(re.escape(short) for short in sorted(_ABBREVIATIONS, key=len, reverse=True))
     text = re.sub(rf"(?<![\w.])({short_forms})\.(?!\w)", full, text, flags=re.IGNORECASE)
     return re.sub(r"\b(?:[A-Za-z]\.){2,}", lambda match: " ".join(match[0].replace(".", " ").split()) + " ", text)
-
-
-def _numbers_written_out(text: str) -> str:
-    text = re.sub(rf"([{''.join(_CURRENCIES)}])({_NUMBER})(\s+(?:thousand|million|billion|trillion)\b)?", _money, text)
-    text = re.sub(r"\b(\d{1,2}):(\d\d)\b", lambda m: f"{_cardinal(m[1])} {_minutes(m[2])}", text)
-    text = re.sub(r"\b(\d+(?:st|nd|rd|th))\b", lambda m: _inflect().number_to_words(m[1].lower()), text, flags=re.IGNORECASE)
-    text = re.sub(r"\b(1[1-9]\d0|20[1-9]0|[2-9]0)s\b", lambda m: _decade(m[1]), text)
-    text = re.sub(r"\b(1[1-9]\d\d|20[1-9]\d)\b(?![.,]\d)", lambda m: _year(m[1]), text)
-    text = re.sub(r"(?<![\w)])-(?=\d)", " minus ", text)
-    return re.sub(_NUMBER, lambda m: f" {_cardinal(m[0])} ", text)
-
-
-def _money(match: re.Match[str]) -> str:
-    unit, small = _CURRENCIES[match[1]]
-    whole, _, part = match[2].replace(",", "").partition(".")
-    if match[3]:
-        return f"{_cardinal(match[2])}{match[3]} {_plural(unit, 2)}"
-    said = f"{_cardinal(whole)} {_plural(unit, int(whole))}"
-    cents = int(part[:2].ljust(2, "0")) if part else 0
-    return f"{said} and {_cardinal(str(cents))} {_plural(small, cents)}" if cents else said
-
-
-def _plural(unit: str, count: int) -> str:
-    return unit if count == 1 or unit in ("yen", "sen") else {"penny": "pence"}.get(unit, f"{unit}s")
-
-
-def _cardinal(digits: str) -> str:
-    digits = digits.replace(",", "")
-    if len(digits) > 1 and digits.startswith("0") and "." not in digits:
-        return " ".join(_inflect().number_to_words(digit) for digit in digits)
-    return str(_inflect().number_to_words(digits, andword="", comma=""))
-
-
-def _minutes(digits: str) -> str:
-    if digits == "00":
-        return "o'clock"
-    return f"oh {_cardinal(digits[1])}" if digits[0] == "0" else _cardinal(digits)
-
-
-def _year(digits: str) -> str:
-    century, rest = _cardinal(digits[:2]), digits[2:]
-    if rest == "00":
-        return f"{century} hundred"
-    return f"{century} oh {_cardinal(rest[1])}" if rest[0] == "0" else f"{century} {_cardinal(rest)}"
-
-
-def _decade(digits: str) -> str:
-    said = _year(digits) if len(digits) == 4 else _cardinal(digits)
-    return re.sub("y$", "ies", said) if said.endswith("y") else f"{said}s"
 
 
 def _spelt(token: str, shouted: bool) -> list[str]:
@@ -101,13 +87,8 @@ def _spelt(token: str, shouted: bool) -> list[str]:
     word = token.lower()
     if not is_known(word):
         word = word.strip("'")
-    if token.isupper() and not shouted and 1 < len(word) <= 5 and not is_known(word):
-        return list(word)
+    capitals = re.fullmatch(r"([A-Z]{2,5})('?s)?", token)
+    if capitals and not shouted and (not is_known(capitals[1].lower()) or capitals[1] in _SPELT):
+        letters = list(capitals[1].lower())
+        return [*letters[:-1], letters[-1] + "'s"] if capitals[2] else letters
     return [word] if word else []
-
-
-@cache
-def _inflect() -> Any:
-    import inflect
-
-    return inflect.engine()

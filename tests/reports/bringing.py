@@ -1,6 +1,7 @@
 """The command line on what people bring: a model whose mouth tells which phone it says, and corpora to add recordings to."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,20 @@ CURVES = Layout("curves", ("jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"
 OPEN = {"pau": 0.0, "p": 0.5, "b": 0.5, "m": 0.5, "aa": 0.9, "ae": 0.8, "ah": 0.7, "ow": 0.4, "iy": 0.3, "uw": 0.2}
 """jawOpen of phones whose opening tests look at; 0.25 of all others."""
 ROUND = {"ow": 0.8, "uw": 1.0, "w": 1.0, "oy": 0.8, "uh": 0.7}
+
+
+@dataclass(frozen=True)
+class Voiced:
+    """A file of clear speech."""
+
+    path: Path
+    text: str
+    duration_s: float
+
+    @classmethod
+    def of(cls, path, text, audio, rate):
+        save_wav(path, audio, rate)
+        return cls(path, text, len(audio) / rate)
 
 
 def run(*arguments):

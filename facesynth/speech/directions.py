@@ -1,0 +1,33 @@
+"""What stands in a transcript and is not said: `[music]`, `(laughs)`, `*sighs*`, `♪`."""
+
+from __future__ import annotations
+
+import re
+
+_DIRECTIONS = (
+    "laugh|chuckl|giggl|sigh|cough|sneez|sniff|sob|cry|cries|crying|gasp|groan|moan|yawn|breath|inhal|exhal|whisper|shout|"
+    "scream|mumbl|mutter|music|applau|clap|cheer|silence|pause|beat|beep|noise|sound|static|inaudible|unintelligible|indistinct|"
+    "crosstalk|overlap|singing|hum|whistl|clears|throat|snort|ring|knock|door|footsteps|background|off-?screen|off-?camera|"
+    "aside|continues|cont'd|speaking|in english|smil|nod|blank|foreign|audience|phone"
+)
+_SAYS_HOW = re.compile(rf"\b(?:{_DIRECTIONS})", re.IGNORECASE)
+_LONGEST = 4
+"""Words in round brackets are said, if there are more of them."""
+_MARKED = re.compile(r"\[[^\[\]]*\]|\{[^{}]*\}|<[^<>\d=]*>|\([^()]*\)|\*[^*\n]+\*|[♪♫♬]+")
+
+
+def without_directions(text: str) -> tuple[str, tuple[str, ...]]:
+    """A transcript with what is not said taken out, and what that was.
+
+    Square, curly and angle brackets hold directions; round ones and asterisks do where a few words say how, such as `(laughs)`.
+    """
+    found: list[str] = []
+
+    def gone(match: re.Match[str]) -> str:
+        marked = match[0]
+        if marked[0] in "(*" and not (len(marked.split()) <= _LONGEST and _SAYS_HOW.search(marked)):
+            return marked
+        found.append(" ".join(marked.split()))
+        return " "
+
+    return _MARKED.sub(gone, text), tuple(dict.fromkeys(found))

@@ -1,0 +1,53 @@
+"""Transcripts as people write them: each line of transcripts.txt beside the words that a person says."""
+
+import json
+from pathlib import Path
+
+import pytest
+from bringing import added, corpus_of, lay_down, run
+
+from facesynth.inference.phones import PHONES
+from facesynth.speech.pronunciation import pronunciations
+from facesynth.speech.transcript import left_out, words_of
+
+LINES = (Path(__file__).with_name("transcripts.txt")).read_text(encoding="utf-8").splitlines()
+
+
+def test_two_hundred_lines_as_they_are_said():
+    assert len(LINES) >= 200
+    wrong = []
+    for line in LINES:
+        text, _, words = line.rpartition(" | ")
+        said = " ".join(words_of(text))
+        if said != words:
+            wrong.append((text, words, said))
+        assert all(set(phones) <= set(PHONES) for word in words_of(text) for phones in pronunciations(word))
+    assert wrong == []
+
+
+@pytest.mark.parametrize("mark", ["\u00ad", "\u200b", "\u200c", "\u200d", "\u2060", "\ufeff"])
+def test_marks_without_width_part_no_word(mark):
+    assert words_of(f"some{mark}thing good{mark}") == ("something", "good")
+
+
+@pytest.mark.parametrize("mark", "\u2019\u2018\u02bc\u00b4`\u2032\uff07")
+def test_every_apostrophe_is_one(mark):
+    assert words_of(f"don{mark}t") == ("don't",)
+
+
+def test_what_is_not_said_is_told_and_what_is_said_stays():
+    assert left_out("[music] so (laughs) we (all of us) go *sighs* [MUSIC]") == ("[music]", "(laughs)", "*sighs*", "[MUSIC]")
+    assert words_of("[music] so (laughs) we (all of us) go *sighs*") == ("so", "we", "all", "of", "us", "go")
+
+
+def test_directions_are_told_where_words_are_placed(tmp_path, talker, voiced):
+    corpus, folder = corpus_of(tmp_path), tmp_path / "session"
+    sound = lay_down(folder, "a", voiced.duration_s)
+    sound.write_bytes(voiced.path.read_bytes())
+    text = f"[music] {voiced.text} (laughs)"
+    report, account = added(corpus, folder, "--text", text)
+    assert "left out of the transcript as directions: [music], (laughs)" in report["remarks"]["a"]
+    assert "[music], (laughs)" in account
+    code, printed, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--text", text, "--json")
+    assert code == 0, said
+    assert any("[music], (laughs)" in line for line in json.loads(printed)["remarks"])
