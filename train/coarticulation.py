@@ -1,6 +1,9 @@
 """Train the co-articulation model on a corpus, judge it on sentences left out, and save it.
 
 python train/coarticulation.py CORPUS [--config configs/coarticulation.yaml] [-o coarticulation.safetensors] [--seed 0]
+
+With --common FILE nothing is trained: the polynomials of all pairs of phones of CORPUS together are written, by which key shapes
+made by hand are blended.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus
@@ -26,6 +30,9 @@ def main(arguments: list[str] | None = None) -> None:
 
     # Load, and leave sentences out.
     corpus = Corpus.open(options.corpus)
+    if options.common:
+        write_common(corpus, options.common)
+        return
     train, test = corpus.split(options.seed)
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
@@ -54,6 +61,16 @@ def report(model: Coarticulation) -> None:
     print(mean_weights(models))
 
 
+def write_common(corpus: Corpus, path: Path) -> None:
+    """One pair of polynomials for all pairs of phones."""
+    model = Coarticulation(pull=1e12, triphones=0).fit(corpus)
+    starting, ending = model.diphones[0, 0].double().numpy().round(4).tolist()
+    licence = ", ".join(corpus.provenance()["licences"])
+    stored = {"source": corpus.performer, "licence": licence, "starting": starting, "ending": ending}
+    path.write_text(yaml.safe_dump(stored, sort_keys=False), encoding="utf-8")
+    print(f"{path} written: {model.facts['phone_samples']} phones of {corpus.performer}")
+
+
 def mean_weights(models: WeightModels) -> str:
     t = np.linspace(0, 1, 5)
     powers = np.vander(t, models.diphones.shape[-1], increasing=True)
@@ -66,6 +83,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--config", type=Path, default=CONFIG)
     parser.add_argument("-o", "--output", type=Path, default=Path("coarticulation.safetensors"))
+    parser.add_argument("--common", type=Path, help="YAML file to write the polynomials of all pairs to")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

@@ -48,12 +48,15 @@ def train(
     METHOD `emotion` makes a detector of emotions in the voice; it also learns from a CSV of sound files
     (file,emotion,speaker,sentence), and extracts the voices' features by --jobs or --engine. The others listen as they
     learn, a two-hundredth of a second to a recording, in one process.
+
+    A method that takes key shapes by hand makes a model of a CSV (phones, a column for each channel of the rig) in place
+    of CORPUS, or of one that comes with facesynth, by its name (`arkit`): nothing is recorded for it.
     """
     from facesynth.config import load_config, parse_settings
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
     from facesynth.device import device_of
-    from facesynth.methods.registry import method_class
+    from facesynth.methods.registry import method_class, of_table
     from facesynth.methods.training import train as learn
     from facesynth.stage.speaker_pictures import save_face
 
@@ -67,6 +70,11 @@ def train(
         train_detector(corpus, chosen, output or Path("emotion.safetensors"), part, workers=Workers(**who), as_json=as_json)
         return
     _require_alone(method, Workers(**who))
+    path = output or Path(f"{method}.safetensors")
+    if (made := of_table(method, str(corpus), chosen)) is not None:
+        made.save(path)
+        _tell_made(path, method, len(made.fitted_layout.names), as_json=as_json)
+        return
     wanted = method_class(method)
     wanted.from_config(chosen)
     recordings = Corpus.open(corpus)
@@ -76,7 +84,6 @@ def train(
     start = time.perf_counter()
     model = learn(wanted, recordings, chosen, seed=seed, device=place)
     seconds = time.perf_counter() - start
-    path = output or Path(f"{method}.safetensors")
     model.save(path)
     face = save_face(recordings, path)
     size_mb = path.stat().st_size / 1e6
@@ -94,6 +101,14 @@ def train(
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+
+
+def _tell_made(path: Path, method: str, channels: int, *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps({"model": str(path), "method": method, "channels": channels}))
+        return
+    click.echo(f"{path}: {method} of shapes by hand, {channels} channels; nothing was learned from anybody's recordings of them")
+    click.echo(f'speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
 
 
 def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:

@@ -157,6 +157,10 @@ class Capabilities:
     """So many recordings of each phone in each emotion it should have."""
     reference: str = ""
     """Label of the row that every table of an evaluation has for it; empty for a method that is compared when asked."""
+    tables: tuple[str, ...] = ()
+    """Names of the tables by hand that come with facesynth, each of which is a model without a recording."""
+    table_reader: str = ""
+    """`module:function` that makes a trained model of such a table, or of a CSV by its path, and of settings."""
     exporter: str = ""
     """`module:function` that turns a trained model into what runs without torch."""
     tuner: str = ""

@@ -146,6 +146,21 @@ def create(name: str, **config: Any) -> Method:
     return method_class(name).from_config(config)
 
 
+def of_table(name: str, table: str, config: Mapping[str, Any]) -> Method | None:
+    """A model made of a table by hand, a CSV or one that comes with facesynth; None for what names no table.
+
+    FacesynthError, naming methods that do, where the method learns from recordings alone.
+    """
+    stated = capabilities_of(name)
+    if table not in stated.tables and Path(table).suffix.lower() != ".csv":
+        return None
+    if not stated.table_reader:
+        having = [one.name for one in known_capabilities()[0] if one.table_reader]
+        raise FacesynthError(f"{name} learns from recordings, not from a table such as {table}; {_joined(having)} takes one")
+    made: Method = resolve_name(stated.table_reader)(table, config)
+    return made
+
+
 def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
     from facesynth.methods.model_file import read_header
