@@ -12,7 +12,7 @@ import click
 from facesynth.cli.method_options import WithMethodOptions, files_among, own_options, taken_apart
 from facesynth.cli.recordings import recordings
 from facesynth.cli.targets import plan_targets, require_free
-from facesynth.cli.types import FILE, Fps, PartType, Size
+from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
@@ -40,11 +40,18 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--speaker", help="Whose phones are taken, where a TextGrid holds those of several.")
 @click.option("--emotion", help="One emotion for everything; `auto`: the one heard in the voice.")
 @click.option("--emotions", type=FILE, help="Emotion over time: CSV, or lines of `end emotion`; `auto`: as heard in the voice.")
-@click.option("--intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of --emotion; 0 is neutral.")
+@click.option(
+    "--intensity",
+    type=Intensity(),
+    default="1",
+    show_default=True,
+    help="Of --emotion, 0 is neutral; or a CSV of time_s,intensity.",
+)
 @click.option("--detector", type=FILE, help="Emotion detector for `auto`; otherwise emotion.safetensors beside the model.")
 @click.option("--to-emotion", help="Map the motion to this emotion, by maps of the model or of --maps.")
 @click.option("--to-intensity", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of --to-emotion.")
 @click.option("--maps", type=FILE, help="A model that learned maps between emotions, which --to-emotion uses.")
+@click.option("--expression", type=FILE, help="A model of expressions: it adds the emotion to the mouth's neutral motion.")
 @click.option("--fps", type=Fps(), show_default="30", help="Frame rate of what is written.")
 @click.option("--head", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")
 @click.option("--eyes", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")

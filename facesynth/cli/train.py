@@ -117,6 +117,8 @@ def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:
     if (unusable := found.get("unusable_phones", 0)) > 0:
         facts["unusable_phones"] = unusable
         click.echo(f"warning: {unusable} recorded phones were left out: their motion has gaps, or they were removed", err=True)
+    for reason in found.get("emotions_left_out", {}).values():
+        click.echo(f"warning: {reason}", err=True)
     if barren := found.get("barren"):
         facts["utterances_left_out"] = barren
         click.echo(f"warning: nothing of {', '.join(barren)} could be used; `facesynth corpus check` says why", err=True)

@@ -35,6 +35,22 @@ class PartType(click.ParamType):
         return part
 
 
+class Intensity(click.ParamType):
+    """A number from 0 to 1, or a file of intensities over time."""
+
+    name = "0..1|file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | Path:
+        """The number; a path where it is none."""
+        try:
+            strength = float(value)
+        except (TypeError, ValueError):
+            return Path(value)
+        if not 0 <= strength <= 1:
+            self.fail(f"wanted a number from 0 to 1, or a CSV of time_s,intensity; got {value!r}", param, ctx)
+        return strength
+
+
 class Fps(click.ParamType):
     """A frame rate; 23.976, 29.97 and 59.94 mean the broadcast fractions."""
 

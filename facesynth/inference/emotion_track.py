@@ -8,8 +8,12 @@ import numpy as np
 
 from .contours import Floats
 from .errors import FacesynthError
+from .filters import gaussian
+from .motion import Motion
 from .speech import EmotionTrack
 
+CHANGES_S = 0.08
+"""Standard deviation of the smoothing with which emotions come and go."""
 WINDOW_S, HOP_S = 2.0, 0.5
 """Length of what is listened to at once, and its step."""
 NOBODY_SPEAKS = "the sound is constant (silence?); choose a recording in which somebody speaks"
@@ -45,3 +49,9 @@ def track_of(ends_s: Floats, probabilities: Floats, emotions: Sequence[str]) -> 
     best = probabilities.argmax(axis=1)
     last = np.append(np.flatnonzero(np.diff(best)), len(best) - 1)
     return EmotionTrack(tuple(emotions[k] for k in best[last]), ends_s[last], np.ones(len(last)))
+
+
+def felt_over(track: EmotionTrack, emotion: str, motion: Motion, amount: Floats | float = 1.0) -> Floats:
+    """[T] amount (of each interval of the emotion track) where the emotion is felt, 0 elsewhere; smooth over time."""
+    felt = np.array([label == emotion for label in track.labels]) * amount
+    return gaussian(felt[track.index_at(motion.times_s)], CHANGES_S * motion.fps)

@@ -18,6 +18,7 @@ _MODELS = {
     "eyes": ".eyes:load_eyes",
     "head_knn": ".head.exported:load_head_knn",
     "head_hmm": ".head.exported:load_head_hmm",
+    "expression": ".expression:load_expression",
     "graphs": ".parts:Parts",
 }
 

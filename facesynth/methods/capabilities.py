@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from facesynth.inference.motion import Motion
     from facesynth.inference.speech import Speech
 
-Part = Literal["mouth", "head", "eyes"]
+Part = Literal["mouth", "expression", "head", "eyes"]
 """Of the face: what a method moves."""
 OptionType = type[bool] | type[int] | type[float] | type[str] | type[Path]
 
@@ -112,6 +112,15 @@ class Looking(Protocol):
 
 
 @runtime_checkable
+class Expressing(Protocol):
+    """Adds emotions to any neutral motion of its layout."""
+
+    def express(self, motion: Motion, speech: Speech, *, seed: int = 0) -> Motion:
+        """With the speech's emotions at their intensities; one of 0 leaves the motion as it is, to the byte."""
+        ...
+
+
+@runtime_checkable
 class Streaming(Protocol):
     """Makes motion while the phones arrive."""
 
@@ -127,6 +136,7 @@ WORDS: Mapping[type, tuple[str, str]] = {
     Joining: ("joins no pieces", "join them"),
     MappingEmotions: ("learns no emotion maps", "learn them"),
     Looking: ("knows nothing of the head", "do"),
+    Expressing: ("adds no expression to other motion", "add one"),
     Streaming: ("makes no motion while the phones arrive", "do"),
 }
 """What a method without an ability does not do, and what those with it do."""

@@ -30,6 +30,7 @@ BUILT_IN = {
         "ridge": "baselines.capabilities:RIDGE",
         "coarticulation": "coarticulation.capabilities:CAPABILITIES",
         "eyes": "eyes.capabilities:CAPABILITIES",
+        "expression": "expression.capabilities:CAPABILITIES",
         "lds": "lds.capabilities:CAPABILITIES",
         "head_knn": "head_knn.capabilities:CAPABILITIES",
         "head_hmm": "head_hmm.capabilities:CAPABILITIES",

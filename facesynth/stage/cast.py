@@ -11,8 +11,8 @@ import numpy as np
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.inference.speech import PhoneTrack, Speech
-from facesynth.methods.capabilities import Explaining, MappingEmotions
+from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
+from facesynth.methods.capabilities import Explaining, Expressing, MappingEmotions
 from facesynth.methods.method import Method
 from facesynth.methods.registry import able, ask, load, read_option, require, require_option
 from facesynth.motion.resample import resample
@@ -34,6 +34,8 @@ class Cast:
     """Moves the head, where a model of its own was asked for."""
     eyes: Method | None = None
     """The same of the eyes."""
+    expression: Method | None = None
+    """Adds the emotions, so that the mouth speaks neutrally, where such a model was asked for."""
     mapper: MappingEmotions | None = None
     """Maps the motion to another emotion."""
     detector: EmotionDetector | None = None
@@ -44,6 +46,11 @@ class Cast:
         """Who moves something."""
         return tuple(one for one in (self.mouth, self.head, self.eyes) if one is not None)
 
+    @property
+    def emotions(self) -> tuple[str, ...]:
+        """Those that can be felt."""
+        return (self.expression or self.mouth).emotions
+
     def options(self, request: Request, phones: PhoneTrack, mover: Method | None = None) -> dict[str, Any]:
         """The own options of one of them, of the mouth where none is named; files of them are read."""
         mover = mover or self.mouth
@@ -51,8 +58,13 @@ class Cast:
         return {name: read_option(mover, name, value, phones) for name, value in asked.items()}
 
     def motion(self, speech: Speech, request: Request, options: dict[str, Any]) -> Motion:
-        """Of the mouth, at its own rate, mapped to another emotion where that was asked for; head and eyes of their models."""
-        motion = self.mouth.synthesize(speech, seed=request.seed, **options)
+        """Of the mouth, at its own rate: with emotions added, or mapped to another, where that was asked for.
+
+        Head and eyes are those of their models.
+        """
+        motion = self.mouth.synthesize(self._said(speech), seed=request.seed, **options)
+        if self.expression is not None:
+            motion = require(self.expression, Expressing).express(motion, speech, seed=request.seed)
         if self.mapper is not None and request.to_emotion is not None:
             motion = self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
         if self.head is not None:
@@ -62,6 +74,13 @@ class Cast:
             own = self.options(request, speech.phones, self.eyes)
             motion = replace(motion, eyes=at_clock(self.eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
         return motion
+
+    def _said(self, speech: Speech) -> Speech:
+        """What the mouth is to say: neutrally, where somebody else adds the emotions."""
+        if self.expression is None:
+            return speech
+        plain = NEUTRAL if NEUTRAL in self.mouth.emotions else self.mouth.emotions[0]
+        return replace(speech, emotions=EmotionTrack.constant(plain, speech.duration_s))
 
 
 def at_clock(part: Motion, motion: Motion) -> Motion:
@@ -78,15 +97,16 @@ def cast_for(mouth: Method, request: Request) -> Cast:
     if mouth.capabilities.part != "mouth":
         part = mouth.capabilities.part
         raise FacesynthError(f"{mouth.name} moves the {part} alone: give its file with --{part}, beside a model of the mouth")
-    if request.emotion not in (None, AUTO, *mouth.emotions):
-        raise unknown("emotion", str(request.emotion), mouth.emotions)
     cast = Cast(
         mouth,
         _mover("head", request.head),
         _mover("eyes", request.eyes),
+        _mover("expression", Part("model", model=request.expression)) if request.expression else None,
         _mapper(mouth, request),
         _detector(mouth, request.detector) if request.listens else None,
     )
+    if request.emotion not in (None, AUTO, *cast.emotions):
+        raise unknown("emotion", str(request.emotion), cast.emotions)
     for name in request.own:
         if not any(one.capabilities.option(name) for one in cast.members):
             require_option(mouth, name)

@@ -14,6 +14,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.speech.hearing import Heard, hear
+from facesynth.speech.intensity import read_intensity
 from facesynth.speech.textgrid import write_textgrid
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import AUTO, Request
@@ -63,32 +64,41 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
     if cast.detector is not None:
         heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker)
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
-    emotion = request.emotion or (None if request.emotions else cast.mouth.emotions[0])
-    return hear(
+    emotion = request.emotion or (None if request.emotions else cast.emotions[0])
+    heard = hear(
         recording,
         text=text,
         phones_path=phones,
         speaker=request.speaker,
         emotion=emotion,
         emotions_path=request.emotions,
-        intensity=request.intensity,
+        intensity=1.0 if isinstance(request.intensity, Path) else request.intensity,
     )
+    return replace(heard, speech=_with_intensity(heard.speech, request))
 
 
 def _with_emotions(speech: Speech, detector: EmotionDetector, cast: Cast, request: Request, tell: Tell) -> Speech:
     """Speech with the emotions heard in it: one for everything (`emotion`), or along time (`emotions`)."""
-    known = [e for e in detector.emotions if e in cast.mouth.emotions]
+    known = [e for e in detector.emotions if e in cast.emotions]
     if not known:
         raise FacesynthError(
-            f"the detector hears {', '.join(detector.emotions)}; this model knows {', '.join(cast.mouth.emotions)}: "
+            f"the detector hears {', '.join(detector.emotions)}; this model knows {', '.join(cast.emotions)}: "
             "train a detector on this performer, or name the --emotion"
         )
     track = _emotions(speech, detector, known, along=request.emotion != AUTO)
-    felt = replace(track, intensities=np.full(len(track.labels), request.intensity))
+    strength = 1.0 if isinstance(request.intensity, Path) else request.intensity
+    felt = replace(track, intensities=np.full(len(track.labels), strength))
     said = ", ".join(f"{label} to {end:.2f} s" for label, end in zip(felt.labels, felt.ends_s, strict=True))
     missing = sorted(set(detector.emotions) - set(known))
     tell(f"heard: {said}" + (f" (the model does not know {', '.join(missing)})" if missing else ""))
-    return replace(speech, emotions=felt)
+    return _with_intensity(replace(speech, emotions=felt), request)
+
+
+def _with_intensity(speech: Speech, request: Request) -> Speech:
+    """Speech whose emotions are as strong over time as a curve says, where one was given."""
+    if not isinstance(request.intensity, Path):
+        return speech
+    return replace(speech, emotions=read_intensity(request.intensity).over(speech.emotions))
 
 
 def _emotions(speech: Speech, detector: EmotionDetector, known: list[str], *, along: bool) -> EmotionTrack:

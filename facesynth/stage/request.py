@@ -18,7 +18,7 @@ RATES_HZ = (1, 1000)
 SOURCES = ("default", "recorded", "off", "model")
 DEFORMS = ("shapes", "distance", "regions")
 PICTURES = ("coherent", "nearest")
-FILES = ("phones", "detector", "maps", "explain", "rig", "mapping")
+FILES = ("phones", "detector", "maps", "expression", "explain", "rig", "mapping")
 
 Source = Literal["default", "recorded", "off", "model"]
 Deform = Literal["shapes", "distance", "regions"]
@@ -77,8 +77,8 @@ class Request:
     """One for everything, or AUTO."""
     emotions: str | Path | None = None
     """A file of emotions over time, or AUTO."""
-    intensity: float = 1.0
-    """Of `emotion`, 0 to 1."""
+    intensity: float | Path = 1.0
+    """Of `emotion`, 0 to 1; or a file of intensities over time."""
     detector: Path | None = None
     """Hears the emotion; the one beside the model otherwise."""
     to_emotion: str | None = None
@@ -87,6 +87,8 @@ class Request:
     """Of `to_emotion`, 0 to 1."""
     maps: Path | None = None
     """A model whose maps `to_emotion` uses, where the mouth's own has none."""
+    expression: Path | None = None
+    """A model of expressions: it adds the emotions to the mouth's neutral motion."""
     own: Mapping[str, Any] = field(default_factory=dict)
     """Options of the mouth's own, by name; see `Capabilities.options`."""
     explain: Path | None = None
@@ -113,12 +115,15 @@ class Request:
                 object.__setattr__(self, name, Path(path))
         if self.emotion is not None and self.emotions is not None:
             raise FacesynthError("both --emotion and --emotions were given; give one")
-        if self.emotions is not None and str(self.emotions) != AUTO and self.intensity != 1:
+        if isinstance(self.intensity, str | Path):
+            object.__setattr__(self, "intensity", Path(self.intensity))
+        elif self.emotions is not None and str(self.emotions) != AUTO and self.intensity != 1:
             raise FacesynthError("--intensity weakens --emotion; in --emotions each line has an intensity of its own")
         if self.maps is not None and self.to_emotion is None:
             raise FacesynthError("--maps belongs to --to-emotion; say which emotion")
         for name in ("intensity", "to_intensity"):
-            if not 0 <= (share := getattr(self, name)) <= 1:
+            share = getattr(self, name)
+            if not isinstance(share, Path) and not 0 <= share <= 1:
                 raise FacesynthError(f"{name} must lie from 0 to 1; got {share:g}")
         for name, choices in (("deform", DEFORMS), ("pictures", PICTURES)):
             if getattr(self, name) not in choices:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from corpora import RATE, tiny_corpus, tiny_utterances
+from corpora import RATE, tiny_corpus, tiny_utterances, twin_corpus
 
 
 @pytest.fixture(scope="session")
@@ -69,6 +69,15 @@ def eyes_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("models") / "eyes.safetensors"
     learnt(recording(seed=1)).save(path)
     return path
+
+
+@pytest.fixture(scope="session")
+def expression_file(tmp_path_factory):
+    from facesynth.methods.expression.method import Expression
+
+    folder = tmp_path_factory.mktemp("models")
+    Expression().fit(twin_corpus(folder / "twins", sentences=4)).save(folder / "expression.safetensors")
+    return folder / "expression.safetensors"
 
 
 @pytest.fixture(scope="session")

@@ -49,7 +49,7 @@ def test_no_data_and_unknown_data_are_told_apart(features, emotion_file, tmp_pat
     assert load(tmp_path / "listed").manifest["training_data"] == {"licences": ["unknown"], "consents": ["unknown"]}
 
 
-@pytest.mark.parametrize("script", ["lds", "efase", "anime_graph", "coarticulation", "eyes", "emotion"])
+@pytest.mark.parametrize("script", ["lds", "efase", "anime_graph", "coarticulation", "expression", "eyes", "emotion"])
 def test_each_script_takes_its_own_method_alone(script, lds_file, emotion_file, tmp_path, monkeypatch, capsys):
     own = {"lds": lds_file, "emotion": emotion_file}
     for name, path in own.items():

@@ -8,16 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..closures import keep_shut
+from ..emotion_track import felt_over
 from ..errors import FacesynthError, unknown
-from ..filters import gaussian
 from ..layout import Layout
 from ..motion import Motion
 from ..speech import NEUTRAL, Speech
 from .candidates import Maps
 from .graph import Floats
-
-EMOTION_CHANGES_S = 0.08
-"""Standard deviation of the smoothing with which mapped emotions come and go."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +56,14 @@ class EmotionMapper:
             raise FacesynthError(f"the intensity is {intensity:g}; wanted 0 (unchanged) to 1 for a mapped emotion")
         self.number(target, target)
         for source in sorted(set(speech.emotions.labels) - {target}):
-            motion = self.map_emotion(motion, source, target, intensity=intensity * _felt(speech, source, motion))
+            motion = self.map_emotion(motion, source, target, intensity=intensity * felt_over(speech.emotions, source, motion))
         return motion
 
     def with_intensity(self, motion: Motion, speech: Speech) -> Motion:
         """An emotion of intensity I is mapped towards neutral by 1 - I; where no map leads there, it stays whole."""
         track = speech.emotions
         for source in sorted(set(track.labels) & set(self.emotions) - {NEUTRAL}):
-            weak = _felt(speech, source, motion, 1 - track.intensities)
+            weak = felt_over(track, source, motion, 1 - track.intensities)
             mapped = NEUTRAL in self.emotions and f"{source} {NEUTRAL}" not in self.no_map
             if mapped and weak.max() > 0:
                 motion = self.map_emotion(motion, source, NEUTRAL, intensity=weak)
@@ -90,10 +87,3 @@ class EmotionMapper:
                 f"this model maps motion of its own layout ({len(self.layout.names)} {self.layout.kind}); "
                 f"got {len(got.names)} {got.kind} with other names"
             )
-
-
-def _felt(speech: Speech, emotion: str, motion: Motion, amount: Floats | float = 1.0) -> Floats:
-    """[T] amount (of each interval of the emotion track) where the emotion is felt, 0 elsewhere; smooth over time."""
-    track = speech.emotions
-    felt = np.array([label == emotion for label in track.labels]) * amount
-    return gaussian(felt[track.index_at(motion.times_s)], EMOTION_CHANGES_S * motion.fps)

@@ -1,0 +1,161 @@
+"""The expression eigenspace as a method of the zoo."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.expression import Expression as Runtime
+from facesynth.inference.expression import Parts, patch_settings
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import NEUTRAL, Speech
+from facesynth.methods.expression.capabilities import CAPABILITIES
+from facesynth.methods.expression.differences import Difference, Floats, difference_of, says_the_same, twins, whole_runs
+from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.motion.pca import Pca
+
+FEWEST = 2
+"""Sentences of an emotion that are needed beside their neutral twins."""
+
+
+@register(CAPABILITIES)
+class Expression(Method):
+    """Adds recorded expressive motion, grown anew by patch-based sampling, to the neutral motion of any method (Deng 2006, §5.2).
+
+    Parameters
+    ----------
+    components : float
+        Of the expression eigenspace: a count, or a share of the variance.
+    patch_s, boundary_s : float
+        Length of a patch and of the zone in which it must fit what is there, s (30 and 5 frames of 120 Hz).
+    tolerance : float
+        epsilon of eq. 3.4: how far a fitting patch may lie from what is there.
+    """
+
+    rest: Tensor
+    """[C] mean neutral pose."""
+    mean: Tensor
+    """[C] the mean of all signals."""
+    basis: Tensor
+    """[C, D] the expression eigenspace."""
+    signals: Tensor
+    """[F, D] recorded signals in it."""
+    starts: Tensor
+    """[R] first frame of each recording."""
+    owners: Tensor
+    """[R] number of each recording's emotion in `facts["expressions"]`."""
+
+    def __init__(
+        self, components: float = 3, patch_s: float = 0.25, boundary_s: float = 5 / 120, tolerance: float = 0.03
+    ) -> None:
+        super().__init__()
+        if components <= 0 or not 0 < boundary_s < patch_s or tolerance < 0:
+            raise FacesynthError(
+                "expression wants positive components, 0 < boundary_s < patch_s and a tolerance that is not negative; got "
+                + ", ".join(f"{name}={value:g}" for name, value in self.config.items())
+            )
+        for name in ("rest", "mean", "basis", "signals", "starts", "owners"):
+            self.register_buffer(name, torch.zeros(0))
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Learn from sentences that were recorded in neutral and in an emotion; nothing is drawn from chance."""
+        self.learned_from(corpus)
+        differences, unlike = differences_of(corpus)
+        emotions, left_out = expressions_of(differences, corpus, unlike)
+        runs = [(emotions.index(d.emotion), run) for d in differences if d.emotion in emotions for run in whole_runs(d.frames)]
+        frames = np.concatenate([run for _, run in runs])
+        pca = Pca.fit(frames, self.config["components"])
+        self._keep(neutral_pose(corpus), pca, [run for _, run in runs], np.array([owner for owner, _ in runs]))
+        self.emotions = (NEUTRAL, *emotions)
+        self.facts = {
+            "expressions": list(emotions),
+            "sentences": {e: len({d.sentence for d in differences if d.emotion == e}) for e in emotions},
+            "variance": float(pca.variance_ratio.sum()),
+            "other_phones": unlike,
+            "emotions_left_out": left_out,
+        }
+        self.speaker().textures  # noqa: B018 - no recording may be shorter than a patch
+        return self.eval()
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """A face that feels what the speech's emotions say, and speaks not."""
+        refuse_options(self.name, options)
+        return self.speaker().synthesize(speech, seed=seed)
+
+    def express(self, motion: Motion, speech: Speech, *, seed: int = 0) -> Motion:
+        """A neutral motion of any method, with the speech's emotions added at their intensities."""
+        return self.speaker().express(motion, speech, seed=seed)
+
+    def speaker(self) -> Runtime:
+        """The model that expresses: what an exported folder is, with this module's arrays for its graph."""
+        return Runtime(
+            Parts(
+                layout=self.fitted_layout,
+                fps=self.fps,
+                emotions=tuple(self.facts["expressions"]),
+                rest=self.rest.double().cpu().numpy(),
+                signals=self.signals.double().cpu().numpy(),
+                starts=self.starts.long().cpu().numpy(),
+                owners=self.owners.long().cpu().numpy(),
+                settings=patch_settings(self.fps, *(self.config[name] for name in ("patch_s", "boundary_s", "tolerance"))),
+                decode=self.decode_array,
+            )
+        )
+
+    def decode_array(self, signals: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Signals [..., T, D] to what they add to frames [..., T, C]."""
+        added = self.mean + torch.from_numpy(signals).to(self.basis) @ self.basis.T
+        return np.asarray(added.cpu().numpy())
+
+    def _keep(self, rest: Floats, pca: Pca, runs: list[Floats], owners: NDArray[np.int64]) -> None:
+        self.rest = torch.from_numpy(rest.astype(np.float32))
+        self.mean, self.basis = pca.mean, pca.basis
+        self.signals = pca.encode(torch.from_numpy(np.concatenate(runs).astype(np.float32)))
+        self.starts = torch.from_numpy(np.cumsum([0, *(len(run) for run in runs[:-1])]))
+        self.owners = torch.from_numpy(owners)
+
+
+def differences_of(corpus: Corpus) -> tuple[list[Difference], int]:
+    """Of all neutral recordings and their expressive twins; and how many pairs have other phones, which cannot be compared."""
+    pairs = list(twins(corpus))
+    alike = [(a, b) for a, b in pairs if says_the_same(a.speech.phones, b.speech.phones)]
+    return [difference_of(a, b) for a, b in alike], len(pairs) - len(alike)
+
+
+def expressions_of(differences: list[Difference], corpus: Corpus, unlike: int) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Emotions that can be learned, and why others cannot; FacesynthError where none can."""
+    recorded = {record.emotion for record in corpus.usable_records}
+    if NEUTRAL not in recorded:
+        raise FacesynthError(f"{corpus.path} has no neutral recordings, and an expression is what an emotion adds to them")
+    if recorded == {NEUTRAL}:
+        raise FacesynthError(f"{corpus.path} was recorded in neutral alone; record the same sentences in another emotion too")
+    left_out = {}
+    for emotion in sorted(recorded - {NEUTRAL}):
+        sentences = {d.sentence for d in differences if d.emotion == emotion and whole_runs(d.frames)}
+        if len(sentences) < FEWEST:
+            left_out[emotion] = (
+                f"{emotion} has {len(sentences)} sentences that were recorded in neutral too with the same phones; "
+                f"at least {FEWEST} are needed"
+            )
+    emotions = tuple(e for e in corpus.emotions if e in recorded - {NEUTRAL} - set(left_out))
+    if not emotions:
+        told = "; ".join(left_out.values()) + (f" ({unlike} pairs have other phones)" if unlike else "")
+        raise FacesynthError(f"{corpus.path} teaches no expression: {told}")
+    return emotions, left_out
+
+
+def neutral_pose(corpus: Corpus) -> Floats:
+    """[C] mean of the neutral recordings; channels that they lack have that of all."""
+    poses = PoseSum(corpus.layout.channels)
+    for utterance in corpus:
+        if utterance.emotion == NEUTRAL:
+            poses.add(utterance.motion.frames)
+    return poses.mean(mean_pose(corpus))
