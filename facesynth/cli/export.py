@@ -25,16 +25,19 @@ import click
 def export(only: str | None, /, model: Path, output: Path, weights: str, as_json: bool) -> None:
     """Write MODEL as a folder that runs without torch: ONNX graphs, arrays and a manifest.
 
-    The words `features` and `face` in place of a model's file write what is heard in sound, and what moves the head.
+    The words `features`, `phones` and `face` in place of a model's file write what is heard in sound, the network that hears
+    phones, and what moves the head.
 
     Every graph is compared with facesynth at two batch sizes and two lengths. facesynth-runtime runs the folder.
     """
     from facesynth.export.models import export_model
     from facesynth.export.parts import export_face, export_features
+    from facesynth.export.phones import export_phones
 
     kept: Any = weights
-    if only in (None, str(model)) and str(model) in ("features", "face"):
-        manifest = (export_features if str(model) == "features" else export_face)(output, kept)
+    parts = {"features": export_features, "phones": export_phones, "face": export_face}
+    if only in (None, str(model)) and str(model) in parts:
+        manifest = parts[str(model)](output, kept)
     else:
         manifest = export_model(model, output, kept, only=only)
     if "unknown" in (*manifest["training_data"]["licences"], *manifest["training_data"]["consents"]):

@@ -1,4 +1,4 @@
-"""`facesynth-runtime FOLDER SOUND.wav …`: motion, or an emotion, from the command line."""
+"""`facesynth-runtime FOLDER SOUND.wav …`: motion, an emotion or phones, from the command line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .wav import read_wav
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Speak, or say which emotion is heard; wrong input is one line and exit code 2."""
+    """Speak, or say which emotion or which phones (lines of `end label`) are heard; wrong input is one line and exit code 2."""
     parser = argparse.ArgumentParser(prog="facesynth-runtime", description="Run a folder that `facesynth export` wrote.")
     parser.add_argument("--version", action="version", version=f"facesynth-runtime {__version__}")
     parser.add_argument("folder", type=Path)
@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--intensity", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("-o", "--output", type=Path, help="NPZ to write: frames, fps, names, and head where it moves")
+    parser.add_argument("-o", "--output", type=Path, help="NPZ to write: frames, fps, names")
     options = parser.parse_args(arguments)
     try:
         _run(options)
@@ -39,6 +39,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     model = load(options.folder, threads=options.threads)
+    if hasattr(model, "spikes"):
+        heard = model.hear(*read_wav(options.sound))
+        print("".join(f"{end_s:.3f} {label}\n" for label, end_s in zip(heard.labels, heard.ends_s, strict=True)), end="")
+        return
     if not hasattr(model, "detect") and not hasattr(model, "synthesize"):
         raise FacesynthError(
             f"{options.folder} holds graphs ({', '.join(model.names)}) and no model that speaks or hears emotions"
@@ -57,10 +61,9 @@ def _run(options: argparse.Namespace) -> None:
         raise unknown("emotion", emotion, model.emotions)
     track = EmotionTrack.constant(emotion, phones.duration_s, options.intensity)
     motion = model.synthesize(Speech(audio, rate, phones, track), seed=checked_seed(options.seed))
-    beside = {} if motion.head is None else {"head": motion.head}
     try:
         with options.output.open("wb") as file:  # a path would get another ending where it has none
-            np.savez(file, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names), **beside)
+            np.savez(file, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names))
     except OSError as error:
         raise FacesynthError(f"{options.output}: {error.strerror or 'cannot be written'}") from None
 

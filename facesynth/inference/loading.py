@@ -19,6 +19,7 @@ _MODELS = {
     "head_knn": ".head.exported:load_head_knn",
     "head_hmm": ".head.exported:load_head_hmm",
     "expression": ".expression:load_expression",
+    "phones": ".phone_hearing:load_phones",
     "graphs": ".parts:Parts",
 }
 

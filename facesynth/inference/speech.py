@@ -24,10 +24,14 @@ class PhoneTrack:
     """ARPAbet, lower case, no stress; `pau` is silence."""
     ends_s: NDArray[np.float64]
     """[P] end of each phone, seconds, strictly increasing."""
+    confidences: NDArray[np.float64] | None = None
+    """[P] 0 to 1, how sure it is that this phone was said; None where nobody has to doubt it."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "ends_s", _checked_ends(self.ends_s, len(self.labels), "phone"))
+        if self.confidences is not None:
+            object.__setattr__(self, "confidences", _checked_shares(self.confidences, len(self.labels), "confidences of phones"))
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -60,10 +64,7 @@ class EmotionTrack:
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "ends_s", _checked_ends(self.ends_s, len(self.labels), "emotion"))
-        intensities = np.asarray(self.intensities, np.float64)
-        if intensities.shape != (len(self.labels),) or not ((intensities >= 0) & (intensities <= 1)).all():
-            raise FacesynthError(f"emotion intensities must be {len(self.labels)} numbers in [0, 1]; got {intensities.tolist()}")
-        object.__setattr__(self, "intensities", intensities)
+        object.__setattr__(self, "intensities", _checked_shares(self.intensities, len(self.labels), "emotion intensities"))
 
     @classmethod
     def constant(cls, emotion: str, duration_s: float, intensity: float = 1.0) -> Self:
@@ -122,3 +123,10 @@ def _checked_ends(ends_s: ArrayLike | Sequence[float], count: int, what: str) ->
     if not np.isfinite(ends).all() or not (np.diff(ends, prepend=0.0) > 0).all():
         raise FacesynthError(f"the ends of a {what} track must increase from 0; got {np.round(ends[:8], 4).tolist()} …")
     return ends
+
+
+def _checked_shares(values: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
+    shares = np.asarray(values, np.float64)
+    if shares.shape != (count,) or not ((shares >= 0) & (shares <= 1)).all():
+        raise FacesynthError(f"{what} must be {count} numbers in [0, 1]; got {shares.tolist()}")
+    return shares

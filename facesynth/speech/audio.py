@@ -142,6 +142,11 @@ def require_sound(audio: NDArray[np.float32], rate: int) -> None:
         )
 
 
+def no_speech() -> FacesynthError:
+    """What is raised where a sound holds no voice."""
+    return FacesynthError("no speech is heard in the sound; give a recording of a voice, or a file of phones")
+
+
 def loudest_db(audio: NDArray[np.float32], rate: int) -> float:
     """RMS of the loudest 50 ms block around its own mean, dB of full scale; -inf for digital silence."""
     block = max(1, round(SHORTEST_S * rate))

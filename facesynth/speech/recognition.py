@@ -1,91 +1,87 @@
-"""Phones of a sound of which nobody knows the words."""
+"""Phones of a sound of which nobody knows the words, in any language: heard by a network, placed by pocketsphinx."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
+from facesynth.inference.spikes import Spike, segments_around
 from facesynth.progress import track
-from facesynth.speech.audio import SILENT_DB, loudest_db, require_sound
-from facesynth.speech.decoding import decode, decoder_sound, heard_time, model_file, new_decoder
-from facesynth.speech.fitting import SLOWNESS, fit_phones
-from facesynth.speech.phone_labels import normalise_phone
+from facesynth.speech.audio import no_speech, require_sound
+from facesynth.speech.fitting import fit_phones
+from facesynth.speech.phone_network import phone_hearing
+from facesynth.speech.pieces import quiet_pieces
+from facesynth.speech.pronunciation import Pronunciation
 from facesynth.speech.segments import Segment, in_one, phone_track
-from facesynth.speech.transcript import words_of
 
-FLUENT_FIT = -65.0
-"""Fit of likely words to the sound above which they are believed."""
-PIECE_S = 12.0
-"""Sounds are cut into pieces of about this length, at their quietest moments."""
-_BLOCK_S = 0.05
-_ONE_PASS = {"fwdflat": False, "bestpath": False, "maxhmmpf": 3000, "maxwpf": 5}
-"""One pass with few candidates takes a third of the time of the usual three and gives no more wrong phones."""
+FURTHEST_S = 0.1
+"""A fit whose phones lie further from their spikes than this, at the median, is of something else."""
+_IN_THE_MODEL = {"ax": "ah", "el": "l", "em": "m", "en": "n"}
+"""Phones that pocketsphinx's English model lacks, and those that stand in for them."""
 
 
-def recognise(audio: NDArray[np.float32], rate: int) -> PhoneTrack:
-    """Phones heard in a sound [S], -1..1, at `rate` Hz, of any length.
+def recognise(audio: NDArray[np.float32], rate: int, *, fit: bool = True) -> PhoneTrack:
+    """Phones heard in a sound [S], -1..1, at `rate` Hz, of any length and language, with confidences.
 
-    Likely English words are looked for first, because what words can follow one another says much about phones; they
-    need not be the right words to be nearly the right phones. Where none fit (songs, other languages) phones are
-    recognised singly. FacesynthError where the sound is too short, silent, or holds no speech.
+    fit: place them by fitting the heard phones to the sound, which takes ten times as long as hearing them; else they lie
+    around the network's spikes. FacesynthError where the sound is too short, silent, or holds no speech.
     """
     require_sound(audio, rate)
-    pieces = [
-        (start / rate, (stop - start) / rate, _phones_in(audio[start:stop], rate))
-        for start, stop in track(_pieces(audio, rate), "listen")
+    heard = phone_hearing().spikes(audio, rate)
+    if not heard:
+        raise no_speech()
+    duration_s = len(audio) / rate
+    around = segments_around(heard, duration_s)
+    placed = in_one(_fitted_pieces(audio, rate, heard, around)) if fit else around
+    return _with_confidences(phone_track(placed, duration_s), heard)
+
+
+def _fitted_pieces(
+    audio: NDArray[np.float32], rate: int, heard: Sequence[Spike], around: Sequence[Segment]
+) -> Iterator[tuple[float, float, Sequence[Segment]]]:
+    """Start and length of each piece of the sound, and its phones, counted from its start; none is lost at an edge."""
+    pieces = quiet_pieces(audio, rate)
+    edges = np.searchsorted([spike.first_s for spike in heard], [stop / rate for _, stop in pieces[:-1]])
+    bounds = [0, *map(int, edges), len(heard)]
+    for (start, stop), (first, last) in track(list(zip(pieces, pairwise(bounds), strict=True)), "listen"):
+        near = [(label, begin_s - start / rate, end_s - start / rate) for label, begin_s, end_s in around[first:last]]
+        yield start / rate, (stop - start) / rate, _fitted(audio[start:stop], rate, heard[first:last], near)
+
+
+def _fitted(audio: NDArray[np.float32], rate: int, heard: Sequence[Spike], near: Sequence[Segment]) -> Sequence[Segment]:
+    """Phones and pauses where pocketsphinx finds them, `near` where it finds something else."""
+    words = _words(heard)
+    found = fit_phones(audio, rate, tuple(words), lambda name: (words[name],)) if words else None
+    if found is None:
+        return near
+    places = [segment for segment in found.phones if segment[0] != SILENCE]
+    if len(places) != len(near) or np.median(np.abs(_middles(places) - _middles(near))) > FURTHEST_S:
+        return near
+    labels = iter(spike.phone for spike in heard)
+    return [(label if label == SILENCE else next(labels), start_s, end_s) for label, start_s, end_s in found.phones]
+
+
+def _words(heard: Sequence[Spike]) -> dict[str, Pronunciation]:
+    """Names for what was heard between two word boundaries, and how each is pronounced."""
+    numbers = np.cumsum([spike.begins_word for spike in heard])
+    words = [
+        tuple(_IN_THE_MODEL.get(spike.phone, spike.phone) for spike, number in zip(heard, numbers, strict=True) if number == word)
+        for word in np.unique(numbers)
     ]
-    phones = phone_track(in_one(pieces), len(audio) / rate)
-    if set(phones.labels) == {SILENCE}:
-        raise FacesynthError("no speech is heard in the sound; give a recording of a voice, or a file of phones")
-    return phones
+    return {f"heard{place}": phones for place, phones in enumerate(words)}
 
 
-def _pieces(audio: NDArray[np.float32], rate: int) -> list[tuple[int, int]]:
-    """First sample and sample after the last of pieces of PIECE_S, give or take a third, cut where it is quietest."""
-    block = round(_BLOCK_S * rate)
-    count = len(audio) // block
-    level = np.asarray(audio[: count * block], np.float64).reshape(count, block).std(axis=1)
-    level = np.convolve(level, np.ones(5) / 5, mode="same")
-    length, slack = round(PIECE_S / _BLOCK_S), round(PIECE_S / _BLOCK_S / 3)
-    cuts = [0]
-    while count - cuts[-1] > length + slack:
-        first = cuts[-1] + length - slack
-        cuts.append(first + int(level[first : first + 2 * slack].argmin()))
-    edges = [*(cut * block + block // 2 * (cut > 0) for cut in cuts), len(audio)]
-    return list(pairwise(edges))
+def _middles(segments: Sequence[Segment]) -> NDArray[np.float64]:
+    return np.array([(start_s + end_s) / 2 for _, start_s, end_s in segments])
 
 
-def _phones_in(audio: NDArray[np.float32], rate: int) -> list[Segment]:
-    if loudest_db(audio, rate) < SILENT_DB:
-        return []
-    words = _likely_words(audio, rate)
-    found = fit_phones(audio, rate, words) if words else None
-    if found is not None and found.fit >= FLUENT_FIT:
-        return list(found.phones)
-    decoder = new_decoder(allphone=model_file("en-us-phone.lm.bin"), lw=4, beam=1e-20, pbeam=1e-20)
-    decode(decoder, decoder_sound(audio, rate, SLOWNESS[0]))
-    return list(_single_phones(decoder))
-
-
-def _likely_words(audio: NDArray[np.float32], rate: int) -> tuple[str, ...]:
-    decoder = new_decoder(lm=model_file("en-us.lm.bin"), dict=model_file("cmudict-en-us.dict"), **_ONE_PASS)
-    decode(decoder, decoder_sound(audio, rate, SLOWNESS[0]))
-    heard = (entry.word.partition("(")[0] for entry in _entries(decoder))
-    return words_of(" ".join(word for word in heard if word[0].isalpha() or word[0] == "'"))
-
-
-def _single_phones(decoder: Any) -> Iterator[Segment]:
-    for entry in _entries(decoder):
-        times = heard_time(entry.start_frame, SLOWNESS[0]), heard_time(entry.end_frame + 1, SLOWNESS[0])
-        yield normalise_phone(entry.word), *times
-
-
-def _entries(decoder: Any) -> Iterable[Any]:
-    return decoder.seg() or () if decoder.hyp() is not None else ()
+def _with_confidences(phones: PhoneTrack, heard: Sequence[Spike]) -> PhoneTrack:
+    """The same track with how sure each phone is; of silence one is."""
+    spoken = iter(spike.confidence for spike in heard)
+    return replace(phones, confidences=np.array([1.0 if label == SILENCE else next(spoken) for label in phones.labels]))

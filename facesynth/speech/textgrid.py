@@ -68,10 +68,19 @@ def read_textgrid(path: str | Path) -> tuple[PhoneTrack, Words]:
 
 
 def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment] = ()) -> None:
-    """Write tiers `words` and `phones` as a TextGrid (long form, UTF-8), atomically; `read_textgrid` gives the same back."""
+    """Write tiers `words` and `phones` as a TextGrid (long form, UTF-8), atomically; `read_textgrid` gives the same back.
+
+    A tier `confidence` beside them says how sure each phone is, 0 to 1, where that is known. It is not read: who corrects
+    phones vouches for them.
+    """
     end_s = phones.duration_s
     said = [(word, start_s, min(stop_s, end_s)) for word, start_s, stop_s in words]
     tiers = {"words": list(_without_gaps(said, end_s)), "phones": segments_of(phones)}
+    if phones.confidences is not None:
+        sure = (f"{confidence:.2f}" for confidence in phones.confidences)
+        tiers["confidence"] = [
+            (said, begin_s, stop_s) for said, (_, begin_s, stop_s) in zip(sure, segments_of(phones), strict=True)
+        ]
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0 ", f"xmax = {_number(end_s)} "]
     lines += ["tiers? <exists> ", f"size = {len(tiers)} ", "item []: "]
     for number, (name, segments) in enumerate(tiers.items(), start=1):

@@ -7,8 +7,9 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, loudest_db
+from facesynth.speech.decoder_recognition import recognise_by_decoder
+from facesynth.speech.pieces import quiet_pieces
 from facesynth.speech.pronunciation import pronunciations
-from facesynth.speech.recognition import _pieces, recognise
 from facesynth.speech.transcript import words_of
 
 FOX = "The quick brown fox jumps over the lazy dog."
@@ -96,7 +97,7 @@ def test_long_sounds_are_taken_in_pieces(say):
 
 def test_recognition_hears_most_of_a_clear_voice(say):
     audio, rate = say(FOX)
-    heard = recognise(audio, rate)
+    heard = recognise_by_decoder(audio, rate)
     assert heard.duration_s == len(audio) / rate
     shared = sum(min(heard.labels.count(phone), phones_of(align(audio, rate, FOX)).count(phone)) for phone in set(heard.labels))
     assert shared >= 18
@@ -104,14 +105,14 @@ def test_recognition_hears_most_of_a_clear_voice(say):
 
 def test_recognition_repeats_itself(say):
     audio, rate = say("Hello, Tom.")
-    once, twice = recognise(audio, rate), recognise(audio, rate)
+    once, twice = recognise_by_decoder(audio, rate), recognise_by_decoder(audio, rate)
     assert once.labels == twice.labels
     assert once.ends_s.tobytes() == twice.ends_s.tobytes()
 
 
 def test_long_sounds_are_recognised_in_pieces(say):
     audio, rate = say("Hello, Tom.")
-    pieces = _pieces(np.tile(audio, 60), rate)
+    pieces = quiet_pieces(np.tile(audio, 60), rate)
     assert pieces[0][0] == 0
     assert pieces[-1][1] == 60 * len(audio)
     assert all(before[1] == after[0] for before, after in pairwise(pieces))
@@ -122,7 +123,7 @@ def test_long_sounds_are_recognised_in_pieces(say):
 
 def test_recognition_refuses_silence():
     with pytest.raises(FacesynthError, match="silent"):
-        recognise(np.zeros(16000, np.float32), 16000)
+        recognise_by_decoder(np.zeros(16000, np.float32), 16000)
 
 
 def test_a_real_talker(recordings):

@@ -1,0 +1,204 @@
+"""The network that hears phones of any speaker and language: sound in, probabilities of IPA tokens and hidden layers out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional
+
+from facesynth.inference.ear import STEP
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phone_hearing import PhoneHearing
+from facesynth.inference.phones import SILENCE
+from facesynth.inference.spikes import Alphabet
+from facesynth.speech.phone_archive import PhoneArchive, read_archive
+from facesynth.speech.phone_labels import normalise_phone
+
+HOP, WINDOW = STEP // 2, 400
+"""Samples between frames of the spectrum, and in each."""
+BLOCKS, WIDTH, HEADS, KERNEL = 4, 144, 4, 31
+BANDS = 80
+SMALLEST_POWER = 1e-10
+
+
+class FeedForward(nn.Module):
+    """Norm, four times as wide, silu, back."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.norm, self.wide, self.back = nn.LayerNorm(WIDTH), nn.Linear(WIDTH, 4 * WIDTH), nn.Linear(4 * WIDTH, WIDTH)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, T, W]"""
+        change: Tensor = self.back(functional.silu(self.wide(self.norm(x))))
+        return change
+
+
+class Attention(nn.Module):
+    """Every frame looks at all frames, with HEADS heads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.norm, self.heads, self.out = nn.LayerNorm(WIDTH), nn.Linear(WIDTH, 3 * WIDTH), nn.Linear(WIDTH, WIDTH)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, T, W]"""
+        batch, count, _ = x.shape
+        split = self.heads(self.norm(x)).reshape(batch, count, 3, HEADS, WIDTH // HEADS)
+        q, k, v = split.permute(2, 0, 3, 1, 4)  # each [B, heads, T, W / heads]
+        seen = functional.scaled_dot_product_attention(q, k, v)
+        change: Tensor = self.out(seen.transpose(1, 2).reshape(batch, count, WIDTH))
+        return change
+
+
+class Convolution(nn.Module):
+    """Norm, a gate, a convolution of each channel along time, silu, a mixing of channels."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.norm, self.gate, self.out = nn.LayerNorm(WIDTH), nn.Linear(WIDTH, 2 * WIDTH), nn.Linear(WIDTH, WIDTH)
+        self.along_time = nn.Conv1d(WIDTH, WIDTH, KERNEL, padding="same", groups=WIDTH)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, T, W]"""
+        gated = functional.glu(self.gate(self.norm(x)), dim=-1)
+        change: Tensor = self.out(functional.silu(self.along_time(gated.transpose(1, 2)).transpose(1, 2)))
+        return change
+
+
+class Block(nn.Module):
+    """A Conformer block (Gulati et al. 2020, eq. 1): half a feed-forward, attention, convolution, half a feed-forward, norm."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first, self.attention, self.convolution, self.last = FeedForward(), Attention(), Convolution(), FeedForward()
+        self.norm = nn.LayerNorm(WIDTH)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, T, W]"""
+        x = x + self.first(x) / 2
+        x = x + self.attention(x)
+        x = x + self.convolution(x)
+        normed: Tensor = self.norm(x + self.last(x) / 2)
+        return normed
+
+
+class PhoneNetwork(nn.Module):
+    """Four Conformer blocks over 80 log-mel bands, a frame of 20 ms at the end, trained for CTC.
+
+    Parameters
+    ----------
+    archive : PhoneArchive
+        The weights; `phone_network()` gives the one that is installed.
+    """
+
+    spectrum: Tensor
+    """[WINDOW, 402] windowed cosines and sines."""
+    filters: Tensor
+    """[201, BANDS]"""
+
+    def __init__(self, archive: PhoneArchive) -> None:
+        super().__init__()
+        self.tokens = archive.tokens
+        self.stem = nn.Conv1d(BANDS, WIDTH, 3, stride=2, padding=1)
+        self.blocks = nn.ModuleList(Block() for _ in range(BLOCKS))
+        self.head = nn.Linear(WIDTH, len(archive.tokens))
+        self.register_buffer("spectrum", torch.zeros(WINDOW, WINDOW + 2))
+        self.register_buffer("filters", torch.zeros(WINDOW // 2 + 1, BANDS))
+        self.load_state_dict(_renamed({name: torch.from_numpy(array) for name, array in archive.weights.items()}))
+        self.requires_grad_(False).eval()
+
+    def forward(self, audio: Tensor) -> tuple[Tensor, Tensor]:
+        """Audio [B, S] at 16 kHz to log-probabilities [B, T, tokens] and the blocks' outputs [B, T, BLOCKS, WIDTH].
+
+        T is 1 + S // STEP; S is more than WINDOW / 2.
+        """
+        x = functional.gelu(self.stem(self.bands(audio).transpose(1, 2))).transpose(1, 2)
+        hidden = []
+        for block in self.blocks:
+            x = block(x)
+            hidden.append(x)
+        return functional.log_softmax(self.head(x), dim=-1), torch.stack(hidden, dim=2)
+
+    def bands(self, audio: Tensor) -> Tensor:
+        """[B, 1 + S // HOP, BANDS] logarithm of the energy; beyond its ends the sound is mirrored."""
+        frames = functional.pad(audio, (WINDOW // 2, WINDOW // 2), mode="reflect").unfold(1, WINDOW, HOP)
+        real, imaginary = (frames @ self.spectrum).square().chunk(2, dim=2)
+        return ((real + imaginary) @ self.filters).clamp(min=SMALLEST_POWER).log()
+
+    @torch.no_grad()
+    def part(self, *, audio: NDArray[Any]) -> list[NDArray[Any]]:
+        """Called as an exported graph is: audio [B, S] to [log-probabilities, hidden]."""
+        return [found.cpu().numpy() for found in self(torch.from_numpy(audio).to(self.spectrum.device))]
+
+
+def alphabet_of(tokens: Sequence[str]) -> Alphabet:
+    """What tokens in IPA stand for on a face; marks, tones and breath stand for nothing."""
+    return Alphabet(tuple(tokens), tuple(map(_phones_of, tokens)))
+
+
+def phone_hearing() -> PhoneHearing:
+    """The installed network, ready to hear; FacesynthError where it is missing or changed."""
+    network = phone_network()
+    return PhoneHearing(network.part, alphabet_of(network.tokens))
+
+
+def _phones_of(token: str) -> tuple[str, ...]:
+    """As one label, else letter by letter (`ja`)."""
+    if token.startswith("<") or not token.strip():
+        return ()
+    try:
+        return tuple(phone for phone in (normalise_phone(token, "ipa"),) if phone != SILENCE)
+    except FacesynthError:
+        return tuple(phone for letter in token for phone in _phones_of(letter)) if len(token) > 1 else ()
+
+
+@cache
+def phone_network() -> PhoneNetwork:
+    """The network with the installed weights, read once; FacesynthError where they are missing or changed."""
+    return PhoneNetwork(read_archive())
+
+
+# The archive comes from a graph whose constants lost their names: convolutions are numbered in the order in which they are
+# applied, and so are the matrices of each block (two of a feed-forward, two of attention, two of the last feed-forward).
+def _renamed(arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Weights by the names that they have in PhoneNetwork."""
+    convolutions, matrices = _numbered(arrays, "onnx::Conv_"), _numbered(arrays, "onnx::MatMul_")
+    found = {"stem.weight": convolutions[0], "stem.bias": convolutions[1], "filters": arrays["mel_fb"]}
+    found["spectrum"] = torch.cat([arrays["stft_real_kernel"], arrays["stft_imag_kernel"]])[:, 0].T
+    found |= {f"head.{kind}": arrays[f"acoustic_model.model.proj.{kind}"].squeeze() for kind in ("weight", "bias")}
+    for number in range(BLOCKS):
+        ours, theirs = f"blocks.{number}.", f"acoustic_model.model.blocks.{number}."
+        names = ("first.wide", "first.back", "attention.heads", "attention.out", "last.wide", "last.back")
+        found |= {f"{ours}{name}.weight": matrices[6 * number + k].T for k, name in enumerate(names)}
+        found[f"{ours}convolution.along_time.weight"] = convolutions[2 + 2 * number]
+        found[f"{ours}convolution.along_time.bias"] = convolutions[3 + 2 * number]
+        for new, old in _NAMES.items():
+            found |= {f"{ours}{new}.{kind}": arrays[f"{theirs}{old}.{kind}"].squeeze() for kind in ("weight", "bias")}
+        found |= {f"{ours}{name}.bias": arrays[theirs + old] for name, old in _BIASES.items()}
+    return found
+
+
+_NAMES = {
+    **{f"{new}.norm": f"{old}.norm" for new, old in (("first", "ffn1"), ("last", "ffn2"), ("convolution", "conv"))},
+    **{
+        "attention.norm": "attn_norm",
+        "norm": "norm",
+        "convolution.gate": "conv.pointwise1",
+        "convolution.out": "conv.pointwise2",
+    },
+}
+_BIASES = {
+    **{"first.wide": "ffn1.fc1.bias", "first.back": "ffn1.fc2.bias", "last.wide": "ffn2.fc1.bias", "last.back": "ffn2.fc2.bias"},
+    **{"attention.heads": "attn.in_proj_bias", "attention.out": "attn.out_proj.bias"},
+}
+
+
+def _numbered(arrays: Mapping[str, Tensor], prefix: str) -> list[Tensor]:
+    names = [name for name in arrays if name.startswith(prefix)]
+    return [arrays[name] for name in sorted(names, key=lambda name: int(name.removeprefix(prefix)))]
