@@ -10,8 +10,8 @@ from facesynth.export.builder import Builder
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
 from facesynth.export.speech_graphs import cepstrum_graph, mel_cepstra_graph
-from facesynth.inference.contours import RATE
 from facesynth.inference.emotion_track import HOP_S, WINDOW_S
+from facesynth.inference.pitch import RATE
 from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.methods.emotion.probabilities import CLOSEST_TO_CERTAIN
 from facesynth.methods.emotion.svm import DEGREE

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder, power_spectrum
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.inference.contours import FFT, HOP, RATE, SMALLEST_POWER, WINDOW
+from facesynth.inference.contours import FFT, HOP, SMALLEST_POWER, WINDOW
+from facesynth.inference.pitch import RATE
 from facesynth.methods.parts import part
 from facesynth.speech.cepstrum import SMALLEST_MAGNITUDE, RealCepstrum
 from facesynth.speech.mel import FLOOR, LogMel

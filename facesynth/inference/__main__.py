@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--intensity", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("-o", "--output", type=Path, help="NPZ to write: frames, fps, names")
+    parser.add_argument("-o", "--output", type=Path, help="NPZ to write: frames, fps, names, and head where it moves")
     options = parser.parse_args(arguments)
     try:
         _run(options)
@@ -61,9 +61,10 @@ def _run(options: argparse.Namespace) -> None:
         raise unknown("emotion", emotion, model.emotions)
     track = EmotionTrack.constant(emotion, phones.duration_s, options.intensity)
     motion = model.synthesize(Speech(audio, rate, phones, track), seed=checked_seed(options.seed))
+    beside = {} if motion.head is None else {"head": motion.head}
     try:
         with options.output.open("wb") as file:  # a path would get another ending where it has none
-            np.savez(file, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names))
+            np.savez(file, frames=motion.frames, fps=motion.fps, names=np.array(motion.layout.names), **beside)
     except OSError as error:
         raise FacesynthError(f"{options.output}: {error.strerror or 'cannot be written'}") from None
 

@@ -10,16 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FacesynthError
+from .pitch import PITCH_WINDOW, RATE, VOICED, pitch_of
 
-RATE = 16000
 HOP = 160
 WINDOW, FFT = 400, 512
-PITCH_WINDOW, PITCH_FFT = 800, 2048
-LOWEST_HZ, HIGHEST_HZ = 65, 500
-OCTAVE_COST = 0.02
-"""What an octave down costs a pitch candidate, in units of the autocorrelation: the highest good one wins."""
-VOICED = 0.55
-"""Autocorrelation from which a frame counts as voiced."""
 QUIETER_DB = 35.0
 """Frames this far under the loudest one are silence where an utterance begins and ends."""
 LEAST_FRAMES = 10
@@ -61,7 +55,7 @@ def contours(audio: NDArray[np.float32], front: FrontEnd) -> Contours:
     loud = np.flatnonzero(level > level.max() - QUIETER_DB / 10)
     kept = slice(loud[0], max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
     sound = audio.astype(np.float64)
-    pitch, periodicity = _pitch(_frames(sound, PITCH_WINDOW)[kept])
+    pitch, periodicity = pitch_of(_frames(sound, PITCH_WINDOW)[kept])
     voiced = periodicity > VOICED
     if voiced.sum() < 5:
         voiced = periodicity >= np.sort(periodicity)[-5]
@@ -88,22 +82,6 @@ def _frames(audio: Floats, length: int) -> Floats:
     """[1 + S // HOP, length] frames centred on multiples of the hop."""
     padded = np.pad(audio, (length // 2, length))
     return np.lib.stride_tricks.sliding_window_view(padded, length)[::HOP][: 1 + len(audio) // HOP]
-
-
-def _pitch(framed: Floats) -> tuple[Floats, Floats]:
-    """Octaves above 100 Hz and periodicity [T], by the autocorrelation divided by the window's own (Boersma 1993)."""
-    window = np.hanning(PITCH_WINDOW)
-    own = _autocorrelation(window[None])[0]
-    found = _autocorrelation((framed - framed.mean(axis=1, keepdims=True)) * window)
-    found = found / np.maximum(found[:, :1], 1e-9) / (own / own[0])
-    shortest, longest = RATE // HIGHEST_HZ, RATE // LOWEST_HZ
-    lags = np.arange(shortest, longest)
-    best = (found[:, lags] - OCTAVE_COST * np.log2(lags / shortest)).argmax(axis=1)
-    return np.log2(RATE / lags[best] / 100), found[np.arange(len(found)), lags[best]]
-
-
-def _autocorrelation(windowed: Floats) -> Floats:
-    return np.fft.irfft(np.square(np.abs(np.fft.rfft(windowed, PITCH_FFT))))[:, :PITCH_WINDOW]
 
 
 def _one_octave(pitch: Floats, voiced: NDArray[np.bool_]) -> Floats:

@@ -19,6 +19,21 @@ def to_rotvec(quaternion: Floats) -> Floats:
     return 2 * logarithm(np.where(quaternion[..., :1] < 0, -quaternion, quaternion))
 
 
+def from_angles(angles: Floats) -> Floats:
+    """Pitch, yaw and roll [..., 3] (rad) to quaternions: roll about z first, then pitch about x, then yaw about y."""
+    x, y, z = (exponential(angles[..., k, None] / 2 * np.eye(3)[k]) for k in range(3))
+    return multiply(multiply(y, x), z)
+
+
+def to_angles(quaternion: Floats) -> Floats:
+    """The inverse of `from_angles`: pitch within a quarter turn, yaw and roll within half a turn."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    pitch = np.arcsin(np.clip(2 * (w * x - y * z), -1, 1))
+    yaw = np.arctan2(2 * (w * y + x * z), 1 - 2 * (x * x + y * y))
+    roll = np.arctan2(2 * (w * z + x * y), 1 - 2 * (x * x + z * z))
+    return np.stack([pitch, yaw, roll], axis=-1)
+
+
 def exponential(half: Floats) -> Floats:
     """Unit quaternion [..., 4] of a pure one given by its vector [..., 3]."""
     angle = np.linalg.norm(half, axis=-1, keepdims=True)

@@ -32,6 +32,8 @@ BUILT_IN = {
         "eyes": "eyes.capabilities:CAPABILITIES",
         "expression": "expression.capabilities:CAPABILITIES",
         "lds": "lds.capabilities:CAPABILITIES",
+        "head_knn": "head_knn.capabilities:CAPABILITIES",
+        "head_hmm": "head_hmm.capabilities:CAPABILITIES",
         "tcn": "baselines.capabilities:TCN",
         "anime_graph": "anime_graph.capabilities:CAPABILITIES",
         "efase": "efase.capabilities:CAPABILITIES",

@@ -6,7 +6,8 @@ import torch
 from torch import Tensor, nn
 from torchaudio.functional import create_dct, melscale_fbanks, spectrogram
 
-from facesynth.inference.contours import FFT, HOP, RATE, SMALLEST_POWER, WINDOW
+from facesynth.inference.contours import FFT, HOP, SMALLEST_POWER, WINDOW
+from facesynth.inference.pitch import RATE
 
 BANDS, CEPSTRA = 40, 20
 LOWEST_HZ = 50.0

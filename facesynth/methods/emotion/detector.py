@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.inference.contours import RATE, Floats
+from facesynth.inference.contours import Floats
 from facesynth.inference.emotion import FRONT_ENDS, SMALLEST_SPREAD, EmotionReader, ReaderSettings, Reading, beside_own_average
 from facesynth.inference.emotion_track import HOP_S, WINDOW_S, track_of
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.pitch import RATE
 from facesynth.inference.speech import EmotionTrack
 from facesynth.methods.emotion.probabilities import vote
 from facesynth.methods.emotion.svm import Kernel, Svm, SvmSettings

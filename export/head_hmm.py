@@ -1,0 +1,6 @@
+"""Export a trained head model: python export/head_hmm.py head_hmm.safetensors -o folder/ [--weights float16]."""
+
+from facesynth.cli.export import export_only
+
+if __name__ == "__main__":
+    export_only("head_hmm")
