@@ -59,12 +59,13 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option(
     "--rig",
     type=FILE,
-    help="Head that is shown: .glb or .gltf with morph targets, or a folder of OBJ files; the built-in one otherwise.",
+    help="Head that is shown: .glb, .gltf or .vrm with morph targets, or a folder of OBJ files; the built-in one otherwise.",
 )
 @click.option(
     "--mapping",
     type=FILE,
-    help="YAML: which of the head's (or the model's) own channels follow which ARKit weights; NAME.yaml beside the head.",
+    help="YAML: which of the head's (or the model's) own channels follow which ARKit weights, or the name of a preset: "
+    "cc4, facs, metahuman, oculus, readyplayerme, vrm0, vrm1. NAME.yaml beside the head, or what fits best, otherwise.",
 )
 @click.option(
     "--deform",

@@ -106,7 +106,8 @@ class HeadStage:
         from facesynth.face.rig.arkit_rig import load_head
         from facesynth.face.rig.own_head import load_own_head
 
-        return cls(load_head(), load_own_head(request.rig, request.mapping) if request.rig else None, request)
+        own = load_own_head(request.rig, request.mapping) if request.rig else None
+        return cls(load_head(), own, request, tuple(f"{own.source.name}: {remark}" for remark in own.remarks) if own else ())
 
     def perform(self, motion: Motion, speech: Speech) -> Performance:
         """Put a motion on the head, at the rate asked for."""
@@ -138,9 +139,10 @@ class HeadStage:
             return motion
         from facesynth.face.rig.channel_map import ChannelMap
         from facesynth.face.rig.mapping_file import read_mapping
+        from facesynth.face.rig.presets import is_preset, preset
 
-        names = motion.layout.names
-        given = read_mapping(self.request.mapping).channels
+        names, asked = motion.layout.names, self.request.mapping
+        given = (preset(str(asked), names) if is_preset(asked) else read_mapping(asked)).channels
         channel_map = ChannelMap.of(names, {name: channel for name, channel in given.items() if name in names})
         frames = channel_map.arkit(motion.frames).astype(np.float32)
         return replace(motion, frames=frames, layout=Layout("curves", ARKIT_NAMES))

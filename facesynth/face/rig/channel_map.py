@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError, unknown
 
+_SIDES = {"l": "Left", "r": "Right"}
 RIDGE = 1e-4
 """Price of a weight where own channels are turned into ARKit's: it decides only what they leave open."""
 
@@ -52,7 +53,8 @@ class ChannelMap:
         found = tuple(given.get(name) or _by_name(name) for name in names)
         if needs_arkit and not any(channel.shares for channel in found):
             raise FacesynthError(
-                f"none of the channels {list(names[:4])} … has an ARKit name such as jawOpen; give a mapping file (--mapping)"
+                f"none of the channels {list(names[:4])} … has a name of ARKit's such as jawOpen, or of a preset;"
+                " give a mapping file (--mapping)"
             )
         return cls(tuple(names), found)
 
@@ -125,10 +127,18 @@ def _bounded(basis: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray
 
 
 def arkit_name(name: str) -> str | None:
-    """The ARKit name that a name means, whatever its case, with `_L` or `_R` for the sides and a prefix before a dot."""
-    last = name.rpartition(".")[2]
-    plain = re.sub(r"[_ -](l|r)$", lambda side: {"l": "left", "r": "right"}[side[1].lower()], last, flags=re.IGNORECASE)
-    return _FOLDED.get(re.sub(r"[_ -]", "", plain).lower())
+    """The ARKit name that a name means, whatever its case, its prefixes and its way to tell the sides apart."""
+    return next((_FOLDED[plain] for plain in folded_names(name) if plain in _FOLDED), None)
+
+
+def folded_names(name: str) -> Iterator[str]:
+    """What a name may say, small letters and digits alone, the whole first: without Blender's `.001`, without what mesh or
+    exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), `_L`, `.R` or `L` as left and right.
+    """
+    text = re.sub(r"\.\d{3}$", "", name.strip())
+    text = re.sub(r"(?:[_ .-]([LRlr])|(?<=[a-z])([LR]))$", lambda side: _SIDES[(side[1] or side[2]).lower()], text)
+    starts = [0, *(match.end() for match in re.finditer(r"__|[_:|./ -]", text))]
+    yield from dict.fromkeys(plain for start in starts if (plain := re.sub(r"[^a-z0-9]", "", text[start:].lower())))
 
 
 def _by_name(name: str) -> Channel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from facesynth.face.files.gltf.scene import Part, Scene, read_scene
 from facesynth.face.rig.channel_map import ChannelMap
 from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
 from facesynth.face.rig.obj import read_shapes
+from facesynth.face.rig.presets import fitting, is_preset, preset
 from facesynth.inference.errors import FacesynthError, unknown
 
 TEXELS = 5
@@ -27,7 +28,7 @@ M_PER_UNIT_MM = 1000.0
 MOVED_SHARE = 0.05
 """A vertex belongs to the face if a shape moves it by this share of the largest movement."""
 _EYE = re.compile(r"eye(?!.*(lash|brow|lid|socket|occl|wet|shadow|tear|blink|liner))", re.IGNORECASE)
-SUFFIXES = (".glb", ".gltf")
+SUFFIXES = (".glb", ".gltf", ".vrm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,8 @@ class OwnHead:
     """The node of a glTF file that turns with the head."""
     eye_nodes: tuple[int, ...] = ()
     """The node of each of `eyes`."""
+    remarks: tuple[str, ...] = ()
+    """What was assumed of the head, for a person."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -91,22 +94,33 @@ class OwnHead:
 def load_own_head(path: str | Path, mapping: str | Path | None = None, *, needs_arkit: bool = True) -> OwnHead:
     """A head from a .glb or .gltf file, or from a folder of OBJ files: the neutral one and one for each shape.
 
-    The mapping is that of the file given, else `NAME.yaml` beside `NAME.glb`, else the channels' names are ARKit's.
+    The mapping is that of the file or of the preset given, else `NAME.yaml` beside `NAME.glb`, else the channels' names are
+    ARKit's, or those of the preset that fits them best.
     needs_arkit: whether some channel must follow ARKit's weights; not so where values come in the head's own channels.
     """
     path = Path(path)
     beside = path.with_suffix(".yaml")
     found = Path(mapping) if mapping is not None else beside if beside.is_file() else None
-    told = read_mapping(found) if found is not None else HeadMapping({})
     if path.is_dir():
-        return _from_obj(path, told, needs_arkit)
+        return _from_obj(path, found, needs_arkit)
     if path.suffix.lower() not in SUFFIXES:
-        raise FacesynthError(f"{path} is no head: wanted .glb, .gltf, or a folder of OBJ files")
-    return _from_scene(path, read_scene(path, TEXELS), told, needs_arkit)
+        raise FacesynthError(f"{path} is no head: wanted .glb, .gltf, .vrm, or a folder of OBJ files")
+    return _from_scene(path, read_scene(path, TEXELS), found, needs_arkit)
 
 
-def _from_scene(path: Path, scene: Scene, told: HeadMapping, needs_arkit: bool) -> OwnHead:
+def _mapping(found: Path | None, names: Sequence[str]) -> tuple[HeadMapping, tuple[str, ...]]:
+    """What is said of channels of these names, and by whom, where nobody asked for that."""
+    if found is not None:
+        return (preset(str(found), names) if is_preset(found) else read_mapping(found)), ()
+    name, channels = fitting(names)
+    moved = sum(bool(channel.shares) for channel in channels.values())
+    said = f"{moved} of its {len(names)} channels follow the preset {name}; --mapping takes another, or a file of your own"
+    return HeadMapping(channels), (said,) if name else ()
+
+
+def _from_scene(path: Path, scene: Scene, found: Path | None, needs_arkit: bool) -> OwnHead:
     names = tuple(dict.fromkeys(name for part in scene.parts for name in part.targets))
+    told, assumed = _mapping(found, names)
     vertices = np.concatenate([part.vertices for part in scene.parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in scene.parts)])
     shapes = np.zeros((len(names), len(vertices), 3), np.float32)
@@ -128,14 +142,17 @@ def _from_scene(path: Path, scene: Scene, told: HeadMapping, needs_arkit: bool) 
     pivot = None if node is None else scene.places[node, :3, 3]
     eye_nodes = tuple(number for _, number in balls)
     arrays = (vertices, shapes, triangles, colours, weight)
-    return _placed(path, arrays, channel_map, told, M_PER_UNIT_MM, pivot, [ball for ball, _ in balls], node, eye_nodes)
+    placed = _placed(path, arrays, channel_map, told, M_PER_UNIT_MM, pivot, [ball for ball, _ in balls], node, eye_nodes)
+    return replace(placed, remarks=(*assumed, *scene.remarks))
 
 
-def _from_obj(folder: Path, told: HeadMapping, needs_arkit: bool) -> OwnHead:
+def _from_obj(folder: Path, found: Path | None, needs_arkit: bool) -> OwnHead:
     names, neutral, moved, triangles = read_shapes(folder)
+    told, assumed = _mapping(found, names)
     colours = np.full((len(triangles), TEXELS, TEXELS, 3), 0.45)
     arrays = (neutral, moved.astype(np.float32), triangles, colours, np.ones(len(neutral)))
-    return _placed(folder, arrays, ChannelMap.of(names, told.channels, needs_arkit=needs_arkit), told, None, None, [], None, ())
+    channel_map = ChannelMap.of(names, told.channels, needs_arkit=needs_arkit)
+    return replace(_placed(folder, arrays, channel_map, told, None, None, [], None, ()), remarks=assumed)
 
 
 def _placed(
@@ -195,7 +212,9 @@ def _head_node(scene: Scene, told: HeadMapping) -> int | None:
             raise unknown("node of the head", told.head, [name for name in scene.names if name])
         return scene.names.index(told.head)
     jointed = {int(node) for part in scene.parts for node in np.flatnonzero(part.follows.any(axis=0))}
-    called = [i for i, name in enumerate(scene.names) if name.rpartition(":")[2].lower() == "head"]
+    if scene.head is not None:
+        return scene.head
+    called = [i for i, name in enumerate(scene.names) if re.search(r"(^|[:_.|])head$", name, re.IGNORECASE)]
     return next((node for node in called if jointed & set(scene.below(node).tolist())), None)
 
 

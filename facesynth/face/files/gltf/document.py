@@ -20,11 +20,11 @@ _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 
 
 def read_document(path: Path) -> gl.GLTF2:
-    """A .glb or .gltf file, taken apart; FacesynthError for anything else."""
+    """A glTF file, taken apart, binary (.glb, .vrm) or JSON as its first bytes say; FacesynthError for anything else."""
     if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_BYTES:
         raise FacesynthError(f"{path} is missing, empty or larger than {LARGEST_BYTES >> 30} GB; export the head as .glb")
     try:
-        document = gl.GLTF2().load_binary(str(path)) if path.suffix.lower() == ".glb" else gl.GLTF2().load_json(str(path))
+        document = gl.GLTF2().load_binary(str(path)) if is_binary(path) else gl.GLTF2().load_json(str(path))
     except Exception as error:  # the library raises anything on damaged files
         raise FacesynthError(f"{path} is no glTF 2.0 file, or is damaged ({in_one_line(error)}); export it again") from None
     if document is None or not document.meshes or not document.nodes:
@@ -35,11 +35,10 @@ def read_document(path: Path) -> gl.GLTF2:
     return document
 
 
-def target_names(mesh: gl.Mesh) -> tuple[str, ...]:
-    """Names of a mesh's morph targets, which exporters keep in its extras; numbers where there are none."""
-    count = max((len(primitive.targets or []) for primitive in mesh.primitives), default=0)
-    given = (mesh.extras or {}).get("targetNames") or []
-    return tuple(str(given[k]) if k < len(given) else f"target_{k}" for k in range(count))
+def is_binary(path: Path) -> bool:
+    """Whether a file begins as a binary glTF does, whatever it is called."""
+    with path.open("rb") as file:
+        return file.read(4) == b"glTF"
 
 
 class Buffers:

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf.buffer import Buffer
-from facesynth.face.files.gltf.document import Buffers, read_document, target_names
+from facesynth.face.files.gltf.document import Buffers, read_document
 from facesynth.face.files.gltf.mesh import M_PER_MM, TriangleMesh, add_mesh, add_targets
+from facesynth.face.files.gltf.morphs import target_names
 from facesynth.face.files.gltf.scene import Scene, read_scene
 from facesynth.face.files.gltf.tracks import (
     Track,
@@ -35,7 +36,7 @@ def animated_document(animation: FaceAnimation, head: OwnHead) -> tuple[gl.GLTF2
     buffer = _continued(document, head)
     tracks = []
     for index, node in enumerate(document.nodes):
-        names = () if node.mesh is None else target_names(document.meshes[node.mesh])
+        names = () if node.mesh is None else target_names(document, node.mesh)
         if names:
             tracks.append(weights_track(index, animation.weights_for(names)))
             node.weights = None
@@ -65,9 +66,9 @@ def _head_tracks(document: gl.GLTF2, animation: FaceAnimation, head: OwnHead, sc
     """Rotation and translation of the node that turns with the head; a new one over everything where there is none."""
     turn, shift = head_turns(animation), animation.head[:, 3:].astype(np.float64) / head.mm_per_unit
     if head.head_node is None:
-        node = _new_root(document, head)
-        place = np.asarray(document.nodes[node].translation) + shift
-        return [rotation_track(node, turn), translation_track(node, place)]
+        node = _new_root(document, head, scene)
+        place = np.asarray(document.nodes[node].translation) + shift @ scene.root[:3, :3]
+        return [rotation_track(node, _within(scene.root, turn)), translation_track(node, place)]
     node, parent = head.head_node, _parent_place(scene, head.head_node)
     rest = _as_trs(document.nodes[node])
     place = np.asarray(rest.translation) + shift @ np.linalg.inv(parent[:3, :3]).T
@@ -88,7 +89,7 @@ def _eye_tracks(document: gl.GLTF2, animation: FaceAnimation, head: OwnHead, sce
 
 
 def _parent_place(scene: Scene, node: int) -> NDArray[np.float64]:
-    return scene.places[scene.parents[node]] if scene.parents[node] >= 0 else np.eye(4)
+    return scene.places[scene.parents[node]] if scene.parents[node] >= 0 else scene.root
 
 
 def _within(parent: NDArray[np.float64], turn: Rotation) -> Rotation:
@@ -115,9 +116,9 @@ def _as_trs(node: gl.Node) -> gl.Node:
     return node
 
 
-def _new_root(document: gl.GLTF2, head: OwnHead) -> int:
+def _new_root(document: gl.GLTF2, head: OwnHead, scene_at_rest: Scene) -> int:
     """Two nodes over the scene: one at the pivot, which turns, and one that puts the scene back to where it was."""
-    pivot = (head.pivot_mm / head.mm_per_unit + head.middle).tolist()
+    pivot = (scene_at_rest.root[:3, :3].T @ (head.pivot_mm / head.mm_per_unit + head.middle)).tolist()
     scene = document.scenes[document.scene or 0]
     index = len(document.nodes)
     document.nodes += [

@@ -11,8 +11,13 @@ import pygltflib as gl
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from facesynth.face.files.gltf.document import Buffers, in_one_line, read_document, target_names
+from facesynth.face.files.gltf.document import Buffers, in_one_line, read_document
+from facesynth.face.files.gltf.morphs import names_twice, target_names
 from facesynth.inference.errors import FacesynthError
+
+MODES = (None, gl.TRIANGLES, gl.TRIANGLE_STRIP, gl.TRIANGLE_FAN)
+BACKWARDS = np.diag([-1.0, 1.0, -1.0, 1.0])
+"""VRM 0.x avatars look along -z; glTF's and ours along +z."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,12 @@ class Scene:
     """Of the nodes; -1 for roots."""
     places: NDArray[np.float64]
     """[nodes, 4, 4] from each node to the world."""
+    root: NDArray[np.float64]
+    """[4, 4] over all nodes: it turns an avatar that looks backwards."""
+    head: int | None = None
+    """The node that the file itself says is the head."""
+    remarks: tuple[str, ...] = ()
+    """What is drawn otherwise than the file says, for a person."""
 
     def below(self, node: int) -> NDArray[np.int64]:
         """The node and all nodes under it."""
@@ -75,18 +86,84 @@ def _scene(document: gl.GLTF2, buffers: Buffers, texels: int) -> Scene:
     for index, node in enumerate(document.nodes):
         for child in node.children or []:
             parents[child] = index
-    places = _places([_matrix(node) for node in document.nodes], parents)
+    root = BACKWARDS if "VRM" in (document.extensions or {}) else np.eye(4)
+    places = root @ _places([_matrix(node) for node in document.nodes], parents)
+    shown = _shown(document)
     names = tuple(str(node.name or "") for node in document.nodes)
     parts = [
         _part(document, buffers, index, primitive, places, texels)
         for index, node in enumerate(document.nodes)
-        if node.mesh is not None
+        if node.mesh is not None and index in shown
         for primitive in document.meshes[node.mesh].primitives
-        if primitive.mode in (None, gl.TRIANGLES)
+        if primitive.mode in MODES
     ]
     if not parts:
         raise FacesynthError(f"{buffers.path} shows no triangles; export the head as a mesh")
-    return Scene(tuple(parts), names, tuple(parents), places)
+    return Scene(tuple(parts), names, tuple(parents), places, root, _head(document), _remarks(document, shown))
+
+
+def _shown(document: gl.GLTF2) -> set[int]:
+    """The nodes of the scene that is shown; all of them where the file has none."""
+    if not document.scenes:
+        return set(range(len(document.nodes)))
+    found, waiting = set[int](), list(document.scenes[document.scene or 0].nodes or [])
+    while waiting:
+        node = waiting.pop()
+        if node not in found:
+            found.add(node)
+            waiting += document.nodes[node].children or []
+    return found
+
+
+def _head(document: gl.GLTF2) -> int | None:
+    """The node of the head of a VRM avatar."""
+    extensions = document.extensions or {}
+    bones = ((extensions.get("VRM") or {}).get("humanoid") or {}).get("humanBones") or []
+    newer = ((extensions.get("VRMC_vrm") or {}).get("humanoid") or {}).get("humanBones") or {}
+    older = next((bone.get("node") for bone in bones if bone.get("bone") == "head"), None)
+    node = older if older is not None else (newer.get("head") or {}).get("node")
+    return node if isinstance(node, int) and 0 <= node < len(document.nodes) else None
+
+
+def _remarks(document: gl.GLTF2, shown: set[int]) -> tuple[str, ...]:
+    """What of a file is drawn otherwise than it says, or not at all."""
+    hidden = [node.name or f"node {k}" for k, node in enumerate(document.nodes) if node.mesh is not None and k not in shown]
+    twice = [name for mesh in range(len(document.meshes)) for name in names_twice(document, mesh)]
+    remarks = []
+    if hidden:
+        remarks.append(f"{', '.join(hidden[:4])} stand outside of the scene and are not drawn")
+    if twice:
+        remarks.append(f"several shapes are called {', '.join(dict.fromkeys(twice))}; the first of each is used")
+    if any(_is_strange(document, number) for number in range(len(document.textures or []))):
+        remarks.append("textures of a kind that is not read (such as KTX2) are drawn in the materials' base colours")
+    return tuple(remarks)
+
+
+def _is_strange(document: gl.GLTF2, texture: int) -> bool:
+    """Whether a texture's picture is of a kind that is not known."""
+    image = _image(document, texture)
+    return image is None or (image.mimeType or "") == "image/ktx2" or (image.uri or "").lower().endswith(".ktx2")
+
+
+def _image(document: gl.GLTF2, texture: int) -> gl.Image | None:
+    """The picture of a texture, PNG or JPEG first, else WebP; None where there is none of a usual kind."""
+    found = document.textures[texture]
+    webp = ((found.extensions or {}).get("EXT_texture_webp") or {}).get("source")
+    source = found.source if found.source is not None else webp
+    return None if source is None else document.images[source]
+
+
+def _corners(mode: int | None, corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """[F, 3] triangles of a list, of a strip (every other one is turned round) or of a fan."""
+    if mode == gl.TRIANGLE_STRIP and len(corners) >= 3:
+        triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+        triangles[1::2] = triangles[1::2, ::-1]
+    elif mode == gl.TRIANGLE_FAN and len(corners) >= 3:
+        triangles = np.stack([np.broadcast_to(corners[0], len(corners) - 2), corners[1:-1], corners[2:]], axis=1)
+    else:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    a, b, c = triangles.T
+    return triangles[(a != b) & (b != c) & (a != c)]
 
 
 def _places(local: list[NDArray[np.float64]], parents: list[int]) -> NDArray[np.float64]:
@@ -115,7 +192,7 @@ def _part(
     mesh = document.meshes[node.mesh]
     vertices = buffers.array(primitive.attributes.POSITION)
     corners = np.arange(len(vertices)) if primitive.indices is None else buffers.array(primitive.indices)[:, 0].astype(np.int64)
-    triangles = corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    triangles = _corners(primitive.mode, corners)
     if _is_gauze(document, primitive):
         triangles = triangles[:0]
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= len(vertices):
@@ -124,7 +201,7 @@ def _part(
     world = np.einsum("vij,vj->vi", turns[:, :3, :3], vertices) + turns[:, :3, 3]
     targets = {
         name: np.einsum("vij,vj->vi", turns[:, :3, :3], moved)
-        for name, moved in zip(target_names(mesh), _targets(buffers, primitive, len(vertices)), strict=False)
+        for name, moved in zip(target_names(document, node.mesh), _targets(buffers, primitive, len(vertices)), strict=False)
     }
     colours = _colours(document, buffers, primitive, triangles, texels)
     return Part(index, str(node.name or mesh.name or ""), world, triangles, targets, follows, colours)
@@ -206,7 +283,9 @@ def _picture(document: gl.GLTF2, buffers: Buffers, texture: int) -> NDArray[np.u
     """[H, W, 3] a picture inside the file; None for one that is elsewhere or of a kind that is not known."""
     from PIL import Image
 
-    image = document.images[document.textures[texture].source]
+    image = _image(document, texture)
+    if image is None:
+        return None
     if image.bufferView is None and not (image.uri or "").startswith("data:"):
         return None
     content = buffers.bytes_of(image.bufferView) if image.bufferView is not None else buffers.from_uri(image.uri)

@@ -1,0 +1,200 @@
+"""Heads of other makers: VRM avatars, names wherever they stand, textures and triangles of other kinds, presets."""
+
+import json
+
+import numpy as np
+import pytest
+from bringing import lay_down, run
+from grids import PHONES, long_grid, put
+from heads import (
+    TALKING,
+    as_strips,
+    head,
+    names_in_accessors,
+    names_in_node,
+    names_in_primitive,
+    names_in_targets,
+    outside,
+    textured,
+    vrm0,
+    vrm1,
+)
+
+from facesynth.face.rig.channel_map import arkit_name
+from facesynth.face.rig.own_head import load_own_head
+from facesynth.face.rig.presets import PRESETS, fitting
+from facesynth.inference.errors import FacesynthError
+
+OPENING = slice(10, 25)
+"""Frames of the first vowel, aa."""
+
+
+@pytest.fixture
+def said(tmp_path, talker):
+    """A function that lets a head say "op a": its channels by name, and what was told."""
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    put(sound.with_suffix(".TextGrid"), long_grid([("phones", PHONES)]))
+
+    def say(path, *options, output="out.npz"):
+        out = tmp_path / output
+        code, printed, errors = run("speak", talker, sound, "-o", out, "--fps", 50, "--rig", path, "--json", *options)
+        assert code == 0, errors
+        told = json.loads(printed)["remarks"]
+        if out.suffix != ".npz":
+            return out, told
+        with np.load(out) as stored:
+            return dict(zip(map(str, stored["names"]), stored["weights"].T, strict=True)), told
+
+    return say
+
+
+@pytest.mark.parametrize("place", [names_in_primitive, names_in_node, names_in_targets, names_in_accessors])
+def test_names_wherever_they_stand(tmp_path, said, place):
+    channels, _ = said(head(tmp_path / "head.glb", place))
+    assert channels["jawOpen"][OPENING].max() > 0.5
+
+
+def test_avatars_by_their_first_bytes(tmp_path, said):
+    older, newer = head(tmp_path / "old.vrm", vrm0), head(tmp_path / "new.vrm", vrm1)
+    for path, opening, preset in ((older, "a", "vrm0"), (newer, "aa", "vrm1")):
+        channels, told = said(path)
+        assert channels[opening][OPENING].max() > 0.5
+        assert any(f"follow the preset {preset}" in line for line in told)
+    odd = head(tmp_path / "binary.gltf")
+    assert load_own_head(odd).names == TALKING
+
+
+def test_an_avatar_that_looks_backwards_is_turned_round(tmp_path, said):
+    plain, turned = load_own_head(head(tmp_path / "plain.vrm", vrm1)), load_own_head(head(tmp_path / "turned.vrm", vrm0))
+    np.testing.assert_allclose(turned.rest_mm, plain.rest_mm, atol=0.01)
+    out, _ = said(turned.source, output="out.glb")
+    again = load_own_head(out)
+    np.testing.assert_allclose(again.rest_mm, turned.rest_mm, atol=0.01)
+
+
+def test_strips_are_the_same_surface(tmp_path):
+    lists, strips = load_own_head(head(tmp_path / "a.glb")), load_own_head(head(tmp_path / "b.glb", as_strips))
+
+    def area_and_facing(own):
+        a, b, c = (own.rest_mm[own.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        return np.linalg.norm(normal, axis=1).sum(), normal.sum(axis=0)
+
+    assert len(strips.triangles) == len(lists.triangles)
+    for got, wanted in zip(area_and_facing(strips), area_and_facing(lists), strict=True):
+        np.testing.assert_allclose(got, wanted, rtol=0.02, atol=50)
+
+
+def test_textures_of_other_kinds(tmp_path, said):
+    own = load_own_head(head(tmp_path / "webp.glb", textured("webp")))
+    assert own.colours[0, 0, 0, 1] > 10 * own.colours[0, 0, 0, 0], "WebP is drawn"
+    path = head(tmp_path / "ktx.glb", textured("ktx2"))
+    np.testing.assert_allclose(load_own_head(path).colours[0, 0, 0], [0.5, 0.3, 0.2], atol=1e-6)
+    assert any("KTX2" in line for line in said(path)[1])
+
+
+def test_what_stands_outside_of_the_scene_is_not_drawn(tmp_path, said):
+    path = head(tmp_path / "spare.glb", outside)
+    assert len(load_own_head(path).rest_mm) == len(load_own_head(head(tmp_path / "plain.glb")).rest_mm)
+    assert any("spare stand outside of the scene" in line for line in said(path)[1])
+
+
+def test_names_twice_move_the_first_and_are_told(tmp_path, said):
+    channels, told = said(head(tmp_path / "twice.glb", names=("jawOpen", "jawOpen", "mouthSmileLeft", "browInnerUp", "Frozen")))
+    assert channels["jawOpen"].max() > 0.5
+    assert channels["jawOpen (2)"].max() == 0
+    assert any("several shapes are called jawOpen" in line for line in told)
+
+
+@pytest.mark.parametrize(
+    ("preset", "names"),
+    [
+        ("cc4", ("Jaw_Open", "Mouth_Pucker_Up_L", "Mouth_Funnel_Up_R", "Brow_Drop_L", "Mouth_Down_Lower_L")),
+        ("vrm0", ("Fcl_MTH_A", "Fcl_MTH_U", "Fcl_MTH_O", "Fcl_EYE_Close_L", "Fcl_ALL_Fun")),
+        ("vrm1", ("aa", "ih", "ou", "ee", "blinkLeft")),
+        ("oculus", ("viseme_aa", "viseme_O", "viseme_CH", "viseme_E", "viseme_I")),
+        ("readyplayerme", ("mouthOpen", "mouthSmile", "eyesClosed", "eyesLookUp", "other")),
+        ("facs", ("AU26", "AU12L", "AU12R", "AU45L", "AU18")),
+        ("facs", ("LipsFunnel", "LipsPucker", "AU26", "LipsUpperUp", "BrowsU_C")),
+        ("metahuman", ("CTRL_expressions_jawOpen", "CTRL_expressions_mouthFunnelUL", "CTRL_expressions_mouthCornerPullL",
+                       "CTRL_expressions_browRaiseInL", "CTRL_expressions_mouthLipsPurseUR")),
+    ],
+)  # fmt: skip
+def test_a_preset_is_chosen_where_it_fits_best_and_told(tmp_path, said, preset, names):
+    assert fitting(names)[0] == preset
+    path = head(tmp_path / "head.glb", names=names)
+    channels, told = said(path)
+    assert any(f"follow the preset {preset}" in line for line in told)
+    assert max(values[OPENING].max() for values in channels.values()) > 0.5
+    asked, told = said(path, "--mapping", preset)
+    assert not any("follow the preset" in line for line in told)
+    for name in names:
+        np.testing.assert_allclose(asked[name], channels[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("A25_Jaw_Open", "jawOpen"), ("A14_Eye_Blink_Left", "eyeBlinkLeft"), ("head_lod0_mesh__jawOpen", "jawOpen"),
+        ("jawOpen.001", "jawOpen"), ("eyeBlink.L", "eyeBlinkLeft"), ("eyeBlinkR", "eyeBlinkRight"),
+        ("Face:mouthSmile_R", "mouthSmileRight"),
+        ("blendShape1.mouthFunnel", "mouthFunnel"), ("MOUTH_PUCKER", "mouthPucker"), ("Frozen", None), ("mouthOpen", None),
+    ],
+)  # fmt: skip
+def test_names_of_arkit_in_disguise(name, meant):
+    assert arkit_name(name) == meant
+
+
+def test_a_head_with_all_of_arkit_needs_no_preset():
+    from facesynth.face.rig.arkit import ARKIT_NAMES
+
+    assert fitting((*ARKIT_NAMES, "viseme_aa", "viseme_O", "viseme_U", "mouthOpen")) == ("", {})
+    assert fitting(("one", "two", "three", "four")) == ("", {})
+
+
+def test_every_preset_says_where_its_names_are_from():
+    from importlib import resources
+
+    for name in PRESETS:
+        text = resources.files("facesynth.face.rig").joinpath("presets", f"{name}.yaml").read_text(encoding="utf-8")
+        assert text.startswith("# ")
+        assert "jawOpen" in text
+
+
+@pytest.mark.parametrize("trials", [60, pytest.param(2000, marks=pytest.mark.slow)])
+def test_heads_with_one_field_changed_are_right_or_one_clear_line(tmp_path, trials):
+    """A valid head of each kind, then one value of its document replaced by another."""
+    kinds = (None, vrm0, vrm1, names_in_primitive, as_strips, textured("webp"), outside)
+    wholes = [head(tmp_path / "whole.glb", kind).read_bytes() for kind in kinds]
+    wrong = [None, -1, 0, 1, 7, 2**31, 1e30, "x", "", [], {}, [0], [-1, 99], True, {"name": 3}, [None], "SCALAR", 5121]
+    rng, read = np.random.default_rng(8), 0
+    for trial in range(trials):
+        whole = wholes[trial % len(wholes)]
+        size = int.from_bytes(whole[12:16], "little")
+        document = json.loads(whole[20 : 20 + size])
+        places = list(_places(document))
+        holder, key = places[rng.integers(len(places))]
+        holder[key] = wrong[rng.integers(len(wrong))]
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        rest = whole[20 + size :]
+        content = b"glTF" + np.array([2, 20 + len(text) + len(rest), len(text)], "<u4").tobytes() + b"JSON" + text + rest
+        path = tmp_path / "hurt.glb"
+        path.write_bytes(content)
+        try:
+            with np.errstate(all="ignore"):
+                own = load_own_head(path)
+            assert np.isfinite(own.rest_mm).all()
+            read += 1
+        except FacesynthError as error:
+            assert "\n" not in str(error)
+            assert len(str(error)) < 500 + len(str(path))
+    assert 0.1 * trials < read < 0.95 * trials
+
+
+def _places(value):
+    """Every place of a document whose value can be changed."""
+    keys = value.keys() if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    for key in keys:
+        yield value, key
+        yield from _places(value[key])
