@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import correlate
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
-from facesynth.motion.gaps import missing_in
+from facesynth.motion.irregular import read_at
 
 Floats = NDArray[np.float64]
 
@@ -95,11 +94,12 @@ def on_clock(motion: Motion, clock: Clock) -> Motion:
     """The motion with frame i at i / fps on the sound's clock: cubic splines, NaN beyond its ends and at gaps."""
     count = max(round((clock.offset_s + (1 + clock.drift) * motion.duration_s) * motion.fps), 1)
     at = (np.arange(count) / motion.fps - clock.offset_s) / (1 + clock.drift) * motion.fps
-    head = None if motion.head is None else _read_at(motion.head, at)
-    eyes = None if motion.eyes is None else _read_at(motion.eyes, at)
+    own = np.arange(len(motion), dtype=np.float64)
+    head = None if motion.head is None else read_at(motion.head, own, at)
+    eyes = None if motion.eyes is None else read_at(motion.eyes, own, at)
     if eyes is not None:
         eyes[:, 0] = np.clip(eyes[:, 0], 0, 1)
-    return Motion(_read_at(motion.frames, at), motion.fps, motion.layout, head, eyes)
+    return Motion(read_at(motion.frames, own, at), motion.fps, motion.layout, head, eyes)
 
 
 def _envelope(audio: NDArray[np.float32], rate: int) -> Floats:
@@ -142,19 +142,3 @@ def _piecewise(theirs: Floats, ours: Floats, offset: int) -> tuple[list[float], 
             middles.append(start + window / 2)
             offsets.append(float(lag + max(first, 0) - start))
     return middles, offsets
-
-
-def _read_at(signal: NDArray[np.float32], at: Floats) -> NDArray[np.float32]:
-    """A signal [T, C] at places `at` [T'] in frames."""
-    missing = missing_in(signal)
-    known = np.flatnonzero(~missing)
-    result = np.full((len(at), signal.shape[1]), np.nan, np.float32)
-    if len(known) < 2:
-        return result
-    near = 1e-6
-    inside = (at >= -near) & (at <= len(signal) - 1 + near)
-    places = np.clip(at[inside], 0, len(signal) - 1)
-    values = make_interp_spline(known, signal[known].astype(np.float64), k=min(3, len(known) - 1))(places)
-    values[missing[np.floor(places + near).astype(int)] | missing[np.ceil(places - near).astype(int)]] = np.nan
-    result[inside] = values
-    return result

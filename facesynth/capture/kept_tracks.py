@@ -14,7 +14,7 @@ from facesynth.capture.track import Track, track_face
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
 
-VERSION = 1
+VERSION = 2
 """Raised where tracking changes its results, so that old tracks are not used any more."""
 
 
@@ -28,7 +28,7 @@ def kept_track(path: str | Path, face: int | None = None) -> Track:
     if track is None:
         track = track_face(path, face)
         with atomic_path(kept) as part, open(part, "wb") as file:
-            np.savez(file, points_px=track.points_px, irises_px=track.irises_px, fps=track.fps, damaged=track.damaged)
+            np.savez(file, **vars(track))
     return track
 
 
@@ -42,7 +42,8 @@ def _place(path: Path, face: int | None) -> Path:
 def _read(kept: Path) -> Track | None:
     """The track, or None where there is none or it is damaged."""
     try:
-        stored = read_arrays(kept, "a track", ("points_px", "irises_px", "fps"), ("damaged",))
+        stored = read_arrays(kept, "a track", ("points_px", "irises_px", "fps", "damaged", "steps_s"))
     except FacesynthError:
         return None
-    return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]), int(stored.get("damaged", 0)))
+    shortest_s, longest_s = stored["steps_s"].tolist()
+    return Track(stored["points_px"], stored["irises_px"], float(stored["fps"]), int(stored["damaged"]), (shortest_s, longest_s))

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice, pairwise
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from facesynth.capture.square import Image
 from facesynth.inference.errors import FacesynthError
+from facesynth.speech.containers import beginning
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -20,6 +23,8 @@ LARGEST_PX = 8192
 """Longest side of a picture; what claims to be larger is damaged."""
 RATES = (5.0, 500.0)
 """Frames per second that a camera may have."""
+FIRST_PICTURES = 300
+"""So many tell the rate where none is stated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +34,7 @@ class Pictures:
     fps: float
     """Mean rate, Hz."""
     images: Iterator[tuple[float, Image]]
-    """Time since the sound began (s; since the first picture where there is no sound) and picture."""
+    """Time on the clock of the sound that `facesynth.speech.audio` reads of the file (s), and picture."""
     damaged: list[float]
     """Times of the pictures read so far that the file holds damaged, so that parts of them are made up."""
 
@@ -42,10 +47,11 @@ def open_video(path: Path) -> Iterator[Pictures]:
     if not path.is_file() or path.stat().st_size == 0:
         raise FacesynthError(f"{path} is empty or does not exist; copy it from the camera again")
     try:
+        zero_s = beginning(path).zero_s
         with av.open(str(path)) as container:
             stream = _stream(container, path)
             damaged: list[float] = []
-            yield Pictures(_rate(stream, path), _decoded(container, stream, path, damaged), damaged)
+            yield Pictures(_rate(stream, path), _decoded(container, stream, path, zero_s, damaged), damaged)
     except FacesynthError:
         raise
     except (av.FFmpegError, ValueError) as error:
@@ -65,33 +71,43 @@ def _stream(container: InputContainer, path: Path) -> Any:
 
 
 def _rate(stream: Any, path: Path) -> float:
-    rate = stream.average_rate or stream.guessed_rate or stream.base_rate
-    if rate is None or not RATES[0] <= float(rate) <= RATES[1]:
-        raise FacesynthError(f"{path} states {rate or 'no'} pictures a second; wanted {RATES[0]:g} to {RATES[1]:g}")
-    return float(rate)
+    """Pictures a second: as stated, else, where the rate varies and a clock's is stated, as most of the first pictures come."""
+    stated = [float(rate) for rate in (stream.average_rate, stream.guessed_rate, stream.base_rate) if rate]
+    likely = next((rate for rate in stated if RATES[0] <= rate <= RATES[1]), None) or _typical_rate(path)
+    if likely is None:
+        raise FacesynthError(
+            f"{path} states {stated[0] if stated else 'no'} pictures a second; wanted {RATES[0]:g} to {RATES[1]:g}"
+        )
+    return likely
 
 
-def _decoded(container: InputContainer, stream: Any, path: Path, damaged: list[float]) -> Iterator[tuple[float, Image]]:
-    begin_s = _sound_start_s(container)
+def _typical_rate(path: Path) -> float | None:
+    """1 over the median step between the first pictures' times; None where it is none that a camera has."""
+    import av
+
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        packets = islice(container.demux(stream), FIRST_PICTURES)
+        times = sorted(float(packet.pts * packet.time_base) for packet in packets if packet.pts is not None)
+    steps = [later - earlier for earlier, later in pairwise(times) if later > earlier]
+    rate = 1 / median(steps) if steps else 0.0
+    return rate if RATES[0] <= rate <= RATES[1] else None
+
+
+def _decoded(
+    container: InputContainer, stream: Any, path: Path, begin_s: float, damaged: list[float]
+) -> Iterator[tuple[float, Image]]:
     number = 0
     for frame in container.decode(stream):
         if frame.pts is None:
             continue
-        time_s = float(frame.pts * frame.time_base)
-        begin_s = time_s if begin_s is None else begin_s
+        time_s = float(frame.pts * frame.time_base) - begin_s
         if frame.is_corrupt:
-            damaged.append(time_s - begin_s)
-        yield time_s - begin_s, _upright(frame)
+            damaged.append(time_s)
+        yield time_s, _upright(frame)
         number += 1
     if not number:
         raise FacesynthError(f"{path} holds no picture that can be read; is it damaged?")
-
-
-def _sound_start_s(container: InputContainer) -> float | None:
-    for stream in container.streams.audio:
-        if stream.time_base is not None:
-            return float((stream.start_time or 0) * stream.time_base)
-    return None
 
 
 def _upright(frame: Any) -> Image:

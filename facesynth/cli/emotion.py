@@ -82,12 +82,15 @@ def _read(
 ) -> dict[str, Any]:
     from facesynth.inference.emotion_track import track_of
     from facesynth.inference.speech import EmotionTrack
-    from facesynth.speech.audio import load_audio, require_sound
+    from facesynth.speech.audio import read_sound, require_sound
     from facesynth.speech.emotions import write_emotions
 
-    audio, rate = load_audio(path)
+    sound = read_sound(path)
+    audio, rate = sound.audio, sound.sample_rate
     require_sound(audio, rate)
-    facts: dict[str, Any] = {"speech": str(path), "duration_s": len(audio) / rate}
+    for remark in sound.remarks:
+        click.echo(f"warning: {path.name}: {remark}", err=True)
+    facts: dict[str, Any] = {"speech": str(path), "duration_s": len(audio) / rate, "remarks": sound.remarks}
     if span is None:
         reading = detector.detect(audio, rate, own)
         track = EmotionTrack.constant(reading.emotion, len(audio) / rate)

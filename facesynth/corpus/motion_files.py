@@ -15,6 +15,7 @@ from facesynth.corpus.npz import read_npz
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.motion.irregular import USUAL_FPS
 from facesynth.motion.pose import remove_head, rigid_points
 from facesynth.motion.resample import resample
 
@@ -23,8 +24,6 @@ TIME = "time_s"
 TIMES = frozenset({TIME, "time", "seconds", "timestamp_s", "time_ms"})
 """Columns of times, in lower case; those that end in ms hold milliseconds."""
 ROUNDING_S = 0.001
-USUAL_FPS = (24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 90, 100, 120, 150, 200, 240, 250, 300, 400, 500)
-"""Rates of cameras and capture systems, Hz."""
 
 
 def load_motion(path: str | Path, layout: Layout, fps: float, written: Written | None = None) -> tuple[Motion, tuple[str, ...]]:

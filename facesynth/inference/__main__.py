@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,11 @@ def _run(options: argparse.Namespace) -> None:
         raise FacesynthError(
             f"{options.folder} holds graphs ({', '.join(model.names)}) and no model that speaks or hears emotions"
         )
-    audio, rate = read_wav(options.sound)
+    with warnings.catch_warnings(record=True) as noticed:
+        warnings.simplefilter("always")
+        audio, rate = read_wav(options.sound)
+    for warning in noticed:
+        print(f"warning: {warning.message}", file=sys.stderr)
     if hasattr(model, "detect"):
         print(json.dumps(model.detect(audio, rate).probabilities))
         return

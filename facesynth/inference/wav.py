@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import mmap
 import struct
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +14,8 @@ from numpy.typing import NDArray
 from .errors import FacesynthError
 
 PCM, EXTENSIBLE = 1, 0xFFFE
+FIRST_CHUNK = 12
+"""Byte at which the first part of the file begins."""
 
 
 def read_wav(path: Path) -> tuple[NDArray[np.float32], int]:
@@ -22,20 +27,78 @@ def read_wav(path: Path) -> tuple[NDArray[np.float32], int]:
     if content[:4] != b"RIFF" or content[8:12] != b"WAVE":
         raise FacesynthError(f"{path} is no WAV file")
     channels, rate = _format(path, _chunk(path, content, b"fmt "))
-    data = _chunk(path, content, b"data")
+    found = find_samples(content)
+    if found is None:
+        raise FacesynthError(f"{path} has no part 'data': it is truncated or no WAV file")
+    if found.cut_off:
+        raise FacesynthError(f"{path} is truncated: {found.stated} bytes are stated, {found.stop - found.start} are there")
+    if found.remark:
+        warnings.warn(f"{path}: {found.remark}", stacklevel=2)
+    data = content[found.start : found.stop]
     if len(data) < 2 * channels:
         raise FacesynthError(f"{path} holds no samples; record it again")
     whole = len(data) - len(data) % (2 * channels)
     return np.frombuffer(data[:whole], "<i2").reshape(-1, channels).mean(axis=1).astype(np.float32) / 32768, rate
 
 
+@dataclass(frozen=True)
+class Samples:
+    """Where the samples of a WAV file lie."""
+
+    start: int
+    """First byte."""
+    stop: int
+    """Byte after the last."""
+    stated: int
+    """Bytes that the header states."""
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether the file states more than it holds."""
+        return self.stated > self.stop - self.start
+
+    @property
+    def remark(self) -> str:
+        """What a person should know of it; empty where the header is right."""
+        if self.stated == self.stop - self.start:
+            return ""
+        if self.cut_off:
+            return f"the header states {self.stated} bytes of sound, {self.stop - self.start} are there: the file is cut off"
+        return (
+            f"the header states {self.stated} bytes of sound, as a recorder that was stopped short leaves it;"
+            f" all {self.stop - self.start} to the end of the file were read"
+        )
+
+
+def find_samples(content: bytes | mmap.mmap) -> Samples | None:
+    """Where the samples lie: to the end of the file where a recorder never wrote their size; None where there are none."""
+    at = FIRST_CHUNK
+    while at + 8 <= len(content):
+        kind, size = struct.unpack_from("<4sI", content, at)
+        start = at + 8
+        if kind == b"data":
+            after = start + size + size % 2
+            whole = after >= len(content) or _are_chunks(content, after)
+            return Samples(start, min(start + size, len(content)) if whole else len(content), size)
+        at = start + size + size % 2
+    return None
+
+
+def _are_chunks(content: bytes | mmap.mmap, at: int) -> bool:
+    """Whether parts of a WAV file follow, and not sound that belongs to the part before."""
+    while at + 8 <= len(content):
+        kind, size = struct.unpack_from("<4sI", content, at)
+        if not all(32 <= letter < 127 for letter in kind) or at + 8 + size > len(content) + 1:
+            return False
+        at += 8 + size + size % 2
+    return True
+
+
 def _chunk(path: Path, content: bytes, name: bytes) -> bytes:
-    at = 12
+    at = FIRST_CHUNK
     while at + 8 <= len(content):
         kind, size = struct.unpack_from("<4sI", content, at)
         if kind == name:
-            if at + 8 + size > len(content):
-                raise FacesynthError(f"{path} is truncated: {size} bytes are stated, {len(content) - at - 8} are there")
             return content[at + 8 : at + 8 + size]
         at += 8 + size + size % 2
     raise FacesynthError(f"{path} has no part {name.decode()!r}: it is truncated or no WAV file")

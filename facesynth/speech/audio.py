@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import mmap
+import struct
 from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 from errno import EIO
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import BytesIO
 from math import gcd
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +21,11 @@ from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.sound import KAISER_BETA, REACH
 from facesynth.inference.sound import resample as polyphase
+from facesynth.inference.wav import FIRST_CHUNK, find_samples
+from facesynth.speech.containers import PRIMED, read_container, unstated_priming
+from facesynth.speech.one_channel import one_channel
 
 if TYPE_CHECKING:
-    from av.container import InputContainer
     from torchaudio.transforms import Resample
 
 SHORTEST_S = 0.05
@@ -27,19 +33,37 @@ SHORTEST_S = 0.05
 SILENT_DB = -60.0
 """Level of the loudest 50 ms, in dB of full scale, below which a sound counts as silence."""
 
-CANCELLED = 0.005
-"""A mean of channels with less than this share of the loudest one's energy: they undo each other (a cable with swapped poles)."""
-LOWEST_HZ = 1000
-"""A rate below it is no rate of speech."""
 LARGEST_KERNEL = 1 << 20
 """Taps. torchaudio writes each phase of its filter out over a whole period: 160 × 497 taps from 44.1 to 16 kHz, but
 16 000 × 44 157 (2.8 GB) from 44 101 Hz. Rates with so little in common take the polyphase filter of the ground floor."""
 BLOCK = 1 << 20
-"""Samples resampled at once, about."""
+"""Samples read or resampled at once, about."""
+MPEG = frozenset({"MPEG", "MP3"})
+"""What libsndfile calls MP3."""
+MPEG_FRAME = 2048
+"""Bytes that the first frame has at most, in which the priming is stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """The sound of a file."""
+
+    audio: NDArray[np.float32]
+    """[S] the mean of the channels, -1..1; sample 0 lies at 0 s on the clock that the file's pictures have."""
+    sample_rate: int
+    """Hz."""
+    remarks: tuple[str, ...] = ()
+    """What was assumed or repaired, a line each."""
 
 
 def load_audio(path: str | Path) -> tuple[NDArray[np.float32], int]:
-    """Read the sound of an audio or video file: mono samples [S] (mean of the channels, -1..1) and their rate in Hz.
+    """Samples and rate of `read_sound`, for those who have told what it remarks, or made the file themselves."""
+    sound = read_sound(path)
+    return sound.audio, sound.sample_rate
+
+
+def read_sound(path: str | Path) -> Recorded:
+    """Read the sound of an audio or video file, mono.
 
     A FacesynthError says whether there is no such file, no sound in it, no sample, or whether it cannot be read.
     """
@@ -48,22 +72,12 @@ def load_audio(path: str | Path) -> tuple[NDArray[np.float32], int]:
         raise FacesynthError(f"{path}: no such file; give a sound or video file")
     if path.stat().st_size == 0:
         raise FacesynthError(f"{path} is empty (0 bytes); export the sound again")
-    channels, rate = _read_plain(path) or _read_container(path)
-    if channels.shape[0] == 0:
+    sound = _read_plain(path) or Recorded(*read_container(path))
+    if not len(sound.audio):
         raise FacesynthError(f"{path} holds 0 samples of sound; record it again")
-    audio = _mono(channels)
-    if not np.isfinite(audio).all():
+    if not np.isfinite(sound.audio).all():
         raise FacesynthError(f"{path} holds NaN or infinite samples; export the sound again")
-    return audio, rate
-
-
-def _mono(channels: NDArray[np.float32]) -> NDArray[np.float32]:
-    """[S] the mean of channels [S, N]; the loudest one where they cancel."""
-    mean = channels.mean(axis=1, dtype=np.float64)
-    energies = np.einsum("sn,sn->n", channels, channels, dtype=np.float64)
-    if mean @ mean < CANCELLED * energies.max(initial=0):
-        return np.array(channels[:, energies.argmax()], np.float32)
-    return mean.astype(np.float32)
+    return sound
 
 
 def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np.float32]:
@@ -155,42 +169,54 @@ def loudest_db(audio: NDArray[np.float32], rate: int) -> float:
     return float(20 * np.log10(loudest)) if loudest > 0 else -np.inf
 
 
-def _read_plain(path: Path) -> tuple[NDArray[np.float32], int] | None:
-    """[S, channels] through libsndfile, or None for a file that it does not know."""
+def _read_plain(path: Path) -> Recorded | None:
+    """A file that libsndfile knows, or None."""
     import soundfile
 
     try:
-        with open(path, "rb") as file:
-            samples, rate = soundfile.read(file, dtype="float32", always_2d=True)
+        with ExitStack() as opened:
+            stored = opened.enter_context(open(path, "rb"))
+            source, remarks = _mended(opened, stored)
+            with soundfile.SoundFile(source) as file:
+                parts = one_channel(partial(_blocks, file))
+                rate, priming = int(file.samplerate), _priming(stored) if file.format in MPEG else 0
     except (soundfile.LibsndfileError, RuntimeError):
         return None
-    return samples, int(rate)
+    audio = np.concatenate(parts) if parts else np.zeros(0, np.float32)
+    if priming:
+        remarks = (*remarks, *unstated_priming("mp3", priming, rate))
+    return Recorded(audio[priming:], rate, remarks)
 
 
-def _read_container(path: Path) -> tuple[NDArray[np.float32], int]:
-    """[S, channels] of the first sound stream of anything that FFmpeg opens."""
-    import av
-
-    try:
-        with av.open(str(path)) as container:
-            if not container.streams.audio:
-                raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
-            rate = int(getattr(container.streams.audio[0], "rate", 0) or 0)
-            if rate < LOWEST_HZ:
-                raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
-            blocks = list(_decoded(container, rate))
-    except FacesynthError:
-        raise
-    except (av.FFmpegError, ValueError) as error:  # damaged titles are no Unicode, damaged streams no layout that is known
-        reason = getattr(error, "strerror", "") or error
-        raise FacesynthError(f"{path} cannot be read as sound or video ({reason}); is it damaged?") from None
-    return (np.concatenate(blocks) if blocks else np.zeros((0, 1), np.float32)), rate
+def _blocks(file: Any) -> Iterator[NDArray[np.float32]]:
+    """All of a file's sound [n, channels], from its beginning."""
+    file.seek(0)
+    yield from file.blocks(BLOCK, dtype="float32", always_2d=True)
 
 
-def _decoded(container: InputContainer, rate: int) -> Iterator[NDArray[np.float32]]:
-    import av
+def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, ...]]:
+    """The file, its header mended in memory where it is a WAV of which a recorder never wrote the size; and what was noticed."""
+    head = stored.read(FIRST_CHUNK)
+    stored.seek(0)
+    if head[:4] != b"RIFF" or head[8:] != b"WAVE":
+        return stored, ()
+    content = opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ))
+    found = find_samples(content)
+    if found is None or not found.remark:
+        return stored, ()
+    if found.cut_off:
+        return stored, (found.remark,)
+    mended = bytearray(content)
+    struct.pack_into("<I", mended, found.start - 4, found.stop - found.start)
+    struct.pack_into("<I", mended, 4, len(mended) - 8)
+    return BytesIO(mended), (found.remark,)
 
-    resampler = av.AudioResampler(format="fltp", rate=rate)
-    for frame in container.decode(audio=0):
-        yield from (block.to_ndarray().T.astype(np.float32) for block in resampler.resample(frame))
-    yield from (block.to_ndarray().T.astype(np.float32) for block in resampler.resample(None))
+
+def _priming(stored: BinaryIO) -> int:
+    """Samples that an encoder of MP3 put in front where the file does not say how many; libsndfile takes off what is stated."""
+    stored.seek(0)
+    head = stored.read(10)
+    title = sum((byte & 127) << 7 * k for k, byte in enumerate(head[:5:-1])) + 10 if head[:3] == b"ID3" else 0
+    stored.seek(title)
+    first = stored.read(MPEG_FRAME)
+    return 0 if b"Xing" in first or b"Info" in first else PRIMED["mp3"]

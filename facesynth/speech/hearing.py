@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import NEUTRAL, EmotionTrack, Speech
-from facesynth.speech.audio import load_audio, require_sound
+from facesynth.speech.audio import read_sound, require_sound
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.phone_sources import Source, find_phones
 from facesynth.speech.segments import Segment
@@ -46,8 +46,10 @@ def hear(
     `emotions_path`, else are one label for the whole (neutral if none is given) at an intensity from 0 to 1.
     FacesynthError says what cannot be used.
     """
-    return hear_sound(
-        *load_audio(audio_path),
+    sound = read_sound(audio_path)
+    heard = hear_sound(
+        sound.audio,
+        sound.sample_rate,
         text=text,
         phones_path=phones_path,
         speaker=speaker,
@@ -56,6 +58,7 @@ def hear(
         emotions_path=emotions_path,
         intensity=intensity,
     )
+    return replace(heard, warnings=(*sound.remarks, *heard.warnings))
 
 
 def hear_sound(

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from facesynth.capture.square import Image
 from facesynth.capture.video import open_video
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.gaps import LONGEST_S
+from facesynth.motion.irregular import ROUNDING_S, read_at, steady_rate
 
-UNSTEADY = 0.25
-"""Of the median step between frames: steps that differ by more make the rate variable."""
-STRAY = 0.25
-"""Frames by which the rate that a file states may be wrong at its end; otherwise the time stamps tell the rate."""
 CUT_LEVEL = 8.0
 """Mean change of brightness (0..255) from one frame to the next above which …"""
 CUT_RATIO = 5.0
@@ -35,6 +33,18 @@ class Footage:
     """Hz."""
     resampled: bool
     """Whether the file's rate varied and the nearest picture was taken for each regular time."""
+    taken_s: NDArray[np.float64] | None = None
+    """[T] when picture i was really taken; None: at i / fps."""
+
+    def at_regular_times(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Points [T, K, 2] found in the pictures, moved to where they were at i / fps."""
+        if self.taken_s is None:
+            return points
+        taken_s, first = np.unique(self.taken_s, return_index=True)
+        found = points[first]
+        regular_s = np.arange(len(points)) / self.fps
+        moved = np.stack([_between(found[:, pair], taken_s, regular_s) for pair in range(points.shape[1])], axis=1)
+        return moved.astype(np.float32)
 
 
 def read_footage(path: str | Path) -> Footage:
@@ -60,16 +70,23 @@ def read_footage(path: str | Path) -> Footage:
 def steady(frames: NDArray[np.uint8], times_s: Sequence[float], nominal_fps: float) -> Footage:
     """Frames [T, H, W, 3] at a steady rate from time 0: as they are, or the nearest to each regular time where steps vary."""
     times = np.array(times_s, np.float64)
-    steps = np.diff(times)
-    typical = float(np.median(steps))
-    even = (np.abs(steps - typical) <= UNSTEADY * typical).all()
-    fps = (len(times) - 1) / (times[-1] - times[0]) if even else 1 / typical
-    if abs(nominal_fps / fps - 1) * len(times) < STRAY:
-        fps = nominal_fps
-    if even and abs(times[0]) <= 0.5 / fps:
+    fps, even = steady_rate(times, nominal_fps)
+    if even and abs(times[0]) <= ROUNDING_S:
         return Footage(frames, fps, resampled=False)
     regular = np.arange(0, times[-1] + 0.5 / fps, 1 / fps)
-    return Footage(frames[np.abs(regular[:, None] - times).argmin(axis=1)], fps, resampled=not even)
+    nearest = np.abs(regular[:, None] - times).argmin(axis=1)
+    return Footage(frames[nearest], fps, resampled=not even, taken_s=times[nearest])
+
+
+def _between(point: NDArray[np.float32], taken_s: NDArray[np.float64], wanted_s: NDArray[np.float64]) -> NDArray[np.float32]:
+    """One point [T, 2] at other times: on a spline between pictures that are near, on a line over pauses; held at the ends."""
+    found = read_at(point, taken_s, wanted_s, LONGEST_S, ROUNDING_S)
+    seen = np.isfinite(point).all(axis=1)
+    if seen.any():
+        for values, own in zip(found.T, point[seen].T, strict=True):
+            lacking = np.isnan(values)
+            values[lacking] = np.interp(wanted_s[lacking], taken_s[seen], own)
+    return found
 
 
 def refuse_cuts(footage: Footage, name: str) -> None:

@@ -17,7 +17,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
 from facesynth.motion.planar import HeadMaps
 
-VERSION = 1
+VERSION = 2
 """Raised where following changes its results, so that old shapes are not used any more."""
 
 

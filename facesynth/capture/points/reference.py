@@ -83,7 +83,7 @@ class Reference:
                 f"only {found.mean():.0%} of the speaker's points are found in it, at least {KEPT_SHARE:.0%} are needed; "
                 "is it another speaker, another camera, or a hidden mouth?"
             )
-        shapes = shapes_of(self.points, self.lower, self.mean, path, footage.fps)
+        shapes = shapes_of(self.points, self.lower, self.mean, footage.at_regular_times(path), footage.fps)
         seen = path[0, : self.lower][found[0]]
         return shapes, Following(float(1 - found.mean()), drift(clip, seen if len(seen) else self.points[: self.lower]))
 

@@ -22,7 +22,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.planar import is_tracked
-from facesynth.speech.audio import as_saved, load_audio
+from facesynth.speech.audio import as_saved, load_audio, read_sound
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.segments import Segment
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
@@ -189,7 +189,8 @@ def _staying(corpus: Corpus, old: Record, kept: str) -> Prepared:
 def _captured(corpus: Corpus, recording: Recording, face: int | None) -> _Take:
     """Sound and motion from their files, or from a video; FacesynthError where they cannot be of one recording."""
     motion, remarks = read_motion(corpus, recording, face)
-    audio, rate = load_audio(recording.sound)
+    sound = read_sound(recording.sound)
+    audio, rate, remarks = sound.audio, sound.sample_rate, (*sound.remarks, *remarks)
     sound_s = len(audio) / rate
     missing = float(np.isnan(motion.frames).mean())
     if missing > LARGEST_MISSING_SHARE:

@@ -13,7 +13,9 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.speech.textgrid import is_silence_mark
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
-VIDEO = frozenset({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg"})
+VIDEO = frozenset(
+    {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".flv", ".3gp", ".wmv", ".ogv"}
+)
 MOTION = frozenset({".npz", ".csv", ".c3d", ".mat"})
 OWN_SOUND = frozenset({".c3d", ".mat"})
 """Motion files that may hold the sound as well."""

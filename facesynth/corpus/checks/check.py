@@ -12,14 +12,14 @@ from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header, no_corpus, read_header
 from facesynth.corpus.limits import LARGEST_DIFFERENCE_S
-from facesynth.corpus.motion_files import USUAL_FPS
 from facesynth.corpus.record import Record, parse_records
 from facesynth.corpus.signals import read_emotion_track, read_motion
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.irregular import USUAL_FPS
 from facesynth.progress import track
-from facesynth.speech.audio import load_audio, require_sound
+from facesynth.speech.audio import read_sound, require_sound
 from facesynth.speech.textgrid import read_labelled
 
 
@@ -61,7 +61,7 @@ def _utterance_problems(files: Files, header: Header, record: Record) -> tuple[l
     if not record.usable:
         return problems, 0
     sound_s = attempt(
-        problems, f"audio/{name}.wav", "restore it, or mark the utterance unusable", lambda: _sound_s(files.audio(name))
+        problems, f"audio/{name}.wav", "restore it, or mark the utterance unusable", lambda: _sound_s(problems, files.audio(name))
     )
     grid = f"phones/{name}.TextGrid"
     said = attempt(problems, grid, "mend it in Praat, or align it again", lambda: read_labelled(files.phones(name), sound_s))
@@ -93,10 +93,12 @@ def _emotion_problems(files: Files, header: Header, record: Record, phones: Phon
     return problems
 
 
-def _sound_s(path: Path) -> float:
-    audio, rate = load_audio(path)
-    require_sound(audio, rate)
-    return len(audio) / rate
+def _sound_s(problems: list[Problem], path: Path) -> float:
+    sound = read_sound(path)
+    do = "write the file again, so that every program reads it so"
+    problems += [Problem(f"audio/{path.name}", remark, do, grave=False) for remark in sound.remarks]
+    require_sound(sound.audio, sound.sample_rate)
+    return len(sound.audio) / sound.sample_rate
 
 
 def _length_problems(name: str, sound_s: float | None, phones: PhoneTrack | None, motion: Motion | None) -> list[Problem]:

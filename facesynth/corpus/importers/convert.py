@@ -19,7 +19,7 @@ from facesynth.corpus.importers.session import Session, survey
 from facesynth.corpus.motion_files import with_points_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
-from facesynth.speech.audio import load_audio, save_wav
+from facesynth.speech.audio import read_sound, save_wav
 from facesynth.speech.textgrid import write_textgrid
 
 
@@ -92,20 +92,27 @@ def _convert(
         raise FacesynthError(f"{path} has other channels than most recordings: {error}") from None
     _write(folder, path.stem, replace(reading, motion=motion))
     if beside is not None:
-        _carry(folder, path.stem, beside)
+        remarks = (*remarks, *_carry(folder, path.stem, beside))
     return (*reading.remarks, *remarks)
 
 
-def _carry(folder: Path, name: str, beside: Recording) -> None:
-    """Bring along what lies beside a recording: its sound, unless it is in the motion's file; phones, words, emotions."""
+def _carry(folder: Path, name: str, beside: Recording) -> tuple[str, ...]:
+    """Bring along what lies beside a recording: its sound, unless it is in the motion's file; phones, words, emotions.
+
+    Returns what was noticed.
+    """
+    remarks: tuple[str, ...] = ()
     if beside.sound != beside.motion:
         if beside.sound.suffix.lower() in VIDEO:
-            save_wav(folder / f"{name}.wav", *load_audio(beside.sound))
+            sound = read_sound(beside.sound)
+            save_wav(folder / f"{name}.wav", sound.audio, sound.sample_rate)
+            remarks = sound.remarks
         elif beside.sound.suffix.lower() in AUDIO:
             _copy(beside.sound, folder / f"{name}{beside.sound.suffix}")
     for path, suffix in ((beside.phones, ""), (beside.text, ""), (beside.emotions, ".emotions.csv")):
         if path is not None:
             _copy(path, folder / f"{name}{suffix or path.suffix}")
+    return remarks
 
 
 def _copy(source: Path, target: Path) -> None:

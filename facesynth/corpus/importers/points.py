@@ -85,7 +85,7 @@ def motion_from_points(folder: Path, video: Path, sound: Path, fps: float) -> tu
         f" {drift.median_px:.2f} px (median), {drift.worst_tenth_px:.2f} px (worst tenth), {drift.lost_share:.0%} get lost"
     ]
     if resampled:
-        remarks.append(f"the video's rate varies: the nearest picture was taken for each 1/{shapes.fps:g} s")
+        remarks.append(f"the video's rate varies: motion was interpolated at the pictures' true times, at {shapes.fps:g} fps")
     motion = shapes.to_motion()
     if sound != video:
         clock = clock_between(*load_audio(video), *load_audio(sound))

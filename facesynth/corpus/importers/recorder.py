@@ -12,7 +12,7 @@ from facesynth.capture.clock import Recorder
 from facesynth.corpus.add.recordings import VIDEO, find_recordings
 from facesynth.inference.errors import FacesynthError
 from facesynth.progress import track
-from facesynth.speech.audio import load_audio, save_wav
+from facesynth.speech.audio import load_audio, read_sound, save_wav
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,14 @@ def cut_for(recorder: Path | None, paths: Iterable[Path]) -> Iterator[Cuts]:
     if recorder is None:
         yield Cuts()
         return
-    searched = Recorder.of(*load_audio(recorder))
+    recorded = read_sound(recorder)
+    searched = Recorder.of(recorded.audio, recorded.sample_rate)
     videos = [
         found for found in find_recordings(paths)[0] if found.motion.suffix.lower() in VIDEO and found.sound == found.motion
     ]
     with tempfile.TemporaryDirectory(prefix="facesynth-") as name:
         folder = Path(name) / recorder.stem
-        sounds, remarks = [], []
+        sounds, remarks = [], [f"{recorder.name}: {remark}" for remark in recorded.remarks]
         for found in track(videos, "finding the clips in the recorder's sound"):
             try:
                 part = searched.part_of(*load_audio(found.motion))

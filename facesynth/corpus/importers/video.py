@@ -69,6 +69,12 @@ def motion_from_video(
         remarks.append(
             f"{track.damaged} of {len(track.present)} pictures are damaged in the file, in part made up; is there a better copy?"
         )
+    if any(track.steps_s):
+        shortest_ms, longest_ms = (round(1000 * step_s) for step_s in track.steps_s)
+        remarks.append(
+            f"the video's rate varies (a picture every {shortest_ms} to {longest_ms} ms): motion was interpolated at the"
+            f" pictures' true times, at {track.fps:g} fps"
+        )
     motion = motion_of(track, layout)
     if sound != video:
         clock = clock_between(*load_audio(video), *load_audio(sound))

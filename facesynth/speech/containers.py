@@ -1,0 +1,234 @@
+"""Sound of whatever FFmpeg opens, at its time stamps.
+
+Packets of sound carry times. Where a recorder lost some, or a stream was cut, they jump; strung together, all that comes after
+would be early or late against the pictures. So each block is laid where its time says, and what is between is silence.
+
+Sample 0 is where the first picture or the first sound lies, whichever is earlier: the same moment from which
+`facesynth.capture.video` counts. Encoders put silence in front of the sound, their priming. MP4, Matroska and Ogg say how
+much, and FFmpeg takes it off; MPEG-TS and FLV begin the sound as much before the pictures; raw streams and AVI say nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from facesynth.inference.errors import FacesynthError
+from facesynth.speech.one_channel import Floats, one_channel
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+
+LOWEST_HZ = 1000
+"""A rate below it is no rate of speech."""
+JUMP_S = 0.008
+"""Time stamps may be off by so much: they are rounded (to 1 ms in Matroska), and clocks of sound drift."""
+AROUND = 9
+"""Blocks over whose median a jump must last; a single stamp that is off moves nothing."""
+TOLD_S = 0.02
+"""Silence in front that is longer is told."""
+LONGEST_SILENCE_S = 3600.0
+"""Of all jumps together; what claims more has damaged time stamps."""
+LARGEST_OVERLAP_S = 1.0
+"""Time stamps that go back further begin another recording."""
+PRIMED = {"aac": 1024, "mp3": 1105}
+"""Samples that any encoder of AAC puts in front at least, as the transform asks; those of LAME and its decoder for MP3."""
+LATEST = {"aac": 2112, "mp3": 1682}
+"""Samples that some encoder puts in front."""
+STATED = frozenset({"mov", "mp4", "m4a", "matroska", "webm", "ogg"})
+"""Formats that say how much priming there is."""
+LONGEST_PRIMING_S = 0.1
+FIRST_PACKETS = 200
+"""A stream whose first frame does not come within so many packets is damaged."""
+ATTACHED_PICTURE = 0x400
+"""FFmpeg's mark of a title picture, which is no video."""
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """When the streams of a file begin, on the container's clock."""
+
+    sound_s: float | None
+    """First sample that is decoded; None without sound."""
+    picture_s: float | None
+    """None without pictures."""
+    priming: int
+    """Samples in front of the sound that are the encoder's, as far as the container leaves them in."""
+    rate: int
+    codec: str
+
+    @property
+    def zero_s(self) -> float:
+        """What counts as 0 s: the earlier of sound and pictures, priming taken off."""
+        if self.sound_s is None or self.picture_s is None:
+            return (self.sound_s or 0.0) + self.priming / max(self.rate, 1) if self.picture_s is None else self.picture_s
+        if self.priming and 0 < self.picture_s - self.sound_s <= LONGEST_PRIMING_S:
+            return self.picture_s
+        return min(self.sound_s, self.picture_s)
+
+    def remarks(self) -> Iterator[str]:
+        """What a person should know of it."""
+        if self.sound_s is None:
+            return
+        if self.priming and (self.picture_s is None or self.sound_s == self.picture_s):
+            yield from unstated_priming(self.codec, self.priming if self.picture_s is None else 0, self.rate)
+        if self.sound_s - self.zero_s > TOLD_S:
+            yield f"the sound begins {self.sound_s - self.zero_s:.2f} s after the pictures; until then it is silent"
+        if self.sound_s < -TOLD_S:
+            yield f"the sound's time stamps begin at {self.sound_s:.2f} s; its first sample counts as 0 s" + (
+                "" if self.picture_s is None else f", the first picture as {self.picture_s - self.zero_s:.2f} s"
+            )
+
+
+def unstated_priming(codec: str, taken_off: int, rate: int) -> Iterator[str]:
+    """What a person should know of a sound whose file does not say how much silence is in front of it."""
+    late_ms = 1000 * (LATEST[codec] - taken_off) / rate
+    done = f"{taken_off} samples were taken off, with some encoders it still" if taken_off else "with some it"
+    encoder = f"{codec.upper()} encoder"
+    yield f"the file does not say how much silence its {encoder} put in front of the sound: {done} comes {late_ms:.0f} ms late"
+
+
+def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
+    """Mono samples [S] of the first sound stream of anything that FFmpeg opens, their rate, and what was noticed."""
+    import av
+
+    try:
+        begin = beginning(path)
+        if begin.sound_s is None:
+            raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
+        times_s: list[float] = []
+        parts = one_channel(partial(_blocks, path, times_s))
+    except FacesynthError:
+        raise
+    except (av.FFmpegError, ValueError) as error:  # damaged titles are no Unicode, damaged streams no layout that is known
+        reason = getattr(error, "strerror", "") or error
+        raise FacesynthError(f"{path} cannot be read as sound or video ({reason}); is it damaged?") from None
+    if not parts:
+        return np.zeros(0, np.float32), begin.rate, ()
+    audio, remarks = laid(path, parts, np.array(times_s[: len(parts)]) - begin.zero_s, begin.rate)
+    return audio, begin.rate, (*begin.remarks(), *remarks)
+
+
+def beginning(path: Path) -> Beginning:
+    """When sound and pictures of a file begin; av.FFmpegError where it is none that FFmpeg opens."""
+    import av
+
+    with av.open(str(path)) as container:
+        picture = _first_frame(container, [s for s in container.streams.video if not s.disposition.value & ATTACHED_PICTURE])
+    with av.open(str(path)) as container:
+        if not container.streams.audio:
+            return Beginning(None, _time_s(picture), 0, 0, "")
+        stream = container.streams.audio[0]
+        rate, codec = int(getattr(stream, "rate", 0) or 0), str(getattr(stream.codec_context, "name", ""))
+        if rate < LOWEST_HZ:
+            raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
+        codec = next((name for name in PRIMED if codec.startswith(name)), codec)
+        states = bool(STATED & set(container.format.name.split(",")))
+        sound = _first_frame(container, [stream])
+        return Beginning(_time_s(sound) or 0.0, _time_s(picture), 0 if states else PRIMED.get(codec, 0), rate, codec)
+
+
+def _first_frame(container: InputContainer, streams: Sequence[Any]) -> Any:
+    """The first frame of a stream, or None where none can be decoded."""
+    import av
+
+    if not streams:
+        return None
+    try:
+        for number, packet in enumerate(container.demux(streams[0])):
+            for frame in packet.decode():
+                return frame
+            if number > FIRST_PACKETS:
+                return None
+    except (av.FFmpegError, ValueError):
+        return None
+    return None
+
+
+def _time_s(frame: Any) -> float | None:
+    return None if frame is None or frame.pts is None else float(frame.pts * frame.time_base)
+
+
+def _blocks(path: Path, times_s: list[float]) -> Iterator[Floats]:
+    """The decoded sound in blocks [n, channels]; the time of each is appended to `times_s`."""
+    import av
+
+    with av.open(str(path)) as container:
+        rate = int(container.streams.audio[0].rate)
+        resampler = av.AudioResampler(format="fltp", rate=rate)
+        for frame in _with_end(container):
+            for block in resampler.resample(frame):
+                time_s = _time_s(block)
+                times_s.append(np.nan if time_s is None else time_s)
+                yield block.to_ndarray().T.astype(np.float32)
+
+
+def _with_end(container: InputContainer) -> Iterator[Any]:
+    yield from container.decode(audio=0)
+    yield None
+
+
+def laid(path: Path, parts: Sequence[Floats], times_s: NDArray[np.float64], rate: int) -> tuple[Floats, tuple[str, ...]]:
+    """Blocks of sound where their times say [S], silence between them; and what was noticed.
+
+    times_s: [N] when each block begins; NaN where the file does not say: right after the one before. What lies before 0 is
+    left out. Where blocks overlap, the later one is kept.
+    """
+    strung = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+    moved = _moved(times_s * rate - strung[:-1], rate)
+    jumps = np.diff(moved, prepend=moved[0])
+    if np.abs(jumps).sum() + max(moved[0], 0) > LONGEST_SILENCE_S * rate:
+        raise FacesynthError(f"{path}: the time stamps of its sound jump by hours; export it again")
+    places = strung[:-1] + moved
+    if jumps.min() < -LARGEST_OVERLAP_S * rate:
+        place_s, back_s = strung[jumps.argmin()] / rate, -jumps.min() / rate
+        raise FacesynthError(
+            f"{path}: at {place_s:.2f} s of its sound the time stamps go back by {back_s:.2f} s, as where two recordings were"
+            " strung together; cut it there"
+        )
+    audio = np.zeros(max(int((places + np.diff(strung)).max()), 0), np.float32)
+    for place, part in zip(places, parts, strict=True):
+        kept = part[max(-place, 0) :]
+        audio[max(place, 0) : max(place, 0) + len(kept)] = kept
+    return audio, tuple(_said(jumps, places / rate, rate))
+
+
+def _said(jumps: NDArray[np.int64], places_s: NDArray[np.float64], rate: int) -> Iterator[str]:
+    told = ((jumps > 0, "gaps", "by its time stamps; they are silent"), (jumps < 0, "overlaps", "where the later part is kept"))
+    for jumped, what, done in told:
+        if jumped.any():
+            first_s = float((places_s - np.maximum(jumps, 0) / rate)[jumped][0])
+            long_s = float(np.abs(jumps[jumped]).sum()) / rate
+            count = np.count_nonzero(jumped)
+            yield f"{what} in the sound: {count}, {long_s:.2f} s in all, the first at {first_s:.2f} s, {done}"
+
+
+# Where each block would lie if all were strung together is subtracted from where its time stamp puts it. What remains is constant
+# but for jumps and for the rounding of the stamps. A running median keeps jumps where they are and drops single stamps that are
+# off; between two jumps the median of the stretch is what the blocks are moved by.
+def _moved(apart: NDArray[np.float64], rate: int) -> NDArray[np.int64]:
+    """[N] samples by which each block is moved from where it would lie if all were strung together."""
+    known = np.isfinite(apart)
+    if not known.any():
+        return np.zeros(len(apart), np.int64)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(apart)), -1))
+    apart = np.where(last >= 0, apart[last], apart[known][0])
+    smooth = median_filter(apart, size=AROUND, mode="nearest")
+    moved, start = np.zeros(len(apart), np.int64), 0
+    for stop in range(1, len(apart) + 1):
+        if stop == len(apart) or abs(smooth[stop] - smooth[start]) > JUMP_S * rate:
+            moved[start:stop] = _whole(float(np.median(apart[start:stop])), rate)
+            start = stop
+    return moved
+
+
+def _whole(samples: float, rate: int) -> int:
+    """Nothing where it is no more than the rounding of time stamps."""
+    return 0 if abs(samples) <= JUMP_S / 4 * rate else round(samples)

@@ -1,0 +1,94 @@
+"""WAV of a recorder that was stopped short: the size of the sound was never written, or is far too small."""
+
+import struct
+
+import bringing
+import numpy as np
+import pytest
+import soundfile
+
+from facesynth.corpus import Corpus
+from facesynth.inference.wav import find_samples, read_wav
+from facesynth.speech.audio import load_audio, read_sound
+
+RATE = 16000
+SOUND = bringing.hum(2.0)
+
+
+def crashed(path, stated, subtype="PCM_16", channels=1, riff=None):
+    """A WAV whose header states so many bytes of sound."""
+    soundfile.write(path, np.repeat(SOUND[:, None], channels, axis=1), RATE, subtype=subtype)
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<I", content, content.index(b"data") + 4, stated)
+    struct.pack_into("<I", content, 4, len(content) - 8 if riff is None else riff)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("stated", [0, 1000, 1001, 64000])
+@pytest.mark.parametrize(("subtype", "channels"), [("PCM_16", 1), ("PCM_16", 2), ("PCM_24", 2), ("FLOAT", 1), ("PCM_U8", 1)])
+@pytest.mark.parametrize("riff", [None, 0, 36])
+def test_the_sound_is_read_to_the_end_and_told(tmp_path, stated, subtype, channels, riff):
+    whole = len(SOUND) * channels * {"PCM_16": 2, "PCM_24": 3, "FLOAT": 4, "PCM_U8": 1}[subtype]
+    if stated >= whole:
+        pytest.skip("that is what is there")
+    sound = read_sound(crashed(tmp_path / "a.wav", stated, subtype, channels, riff))
+    np.testing.assert_allclose(sound.audio, SOUND, atol=1 / 127 if subtype == "PCM_U8" else 1e-4)
+    (remark,) = sound.remarks
+    assert f"states {stated} bytes of sound" in remark
+    assert f"all {whole} to the end of the file were read" in remark
+
+
+@pytest.mark.parametrize("stated", [0xFFFFFFFF, 0x7FFFFFFF, 70000])
+def test_a_size_that_is_too_large_is_told(tmp_path, stated):
+    sound = read_sound(crashed(tmp_path / "a.wav", stated))
+    np.testing.assert_allclose(sound.audio, SOUND, atol=1e-4)
+    assert f"the header states {stated} bytes of sound, 64000 are there" in sound.remarks[0]
+
+
+def test_parts_after_the_sound_are_no_sound(tmp_path):
+    path = tmp_path / "a.wav"
+    soundfile.write(path, SOUND, RATE)
+    title = b"LIST" + struct.pack("<I", 26) + b"INFOINAM" + struct.pack("<I", 14) + b"a fine take \0\0"
+    for end in (title, title + b"id3 " + struct.pack("<I", 4) + b"abcd", b"\0"):
+        path.write_bytes(path.read_bytes()[: 44 + 64000] + end)
+        sound = read_sound(path)
+        assert len(sound.audio) == len(SOUND)
+        assert sound.remarks == ()
+
+
+def test_the_runtime_reads_it_too(tmp_path):
+    for stated in (0, 500):
+        path = crashed(tmp_path / "a.wav", stated)
+        with pytest.warns(UserWarning, match="all 64000 to the end of the file were read"):
+            audio, rate = read_wav(path)
+        assert rate == RATE
+        np.testing.assert_allclose(audio, SOUND, atol=1e-4)
+
+
+def test_damaged_headers_find_samples_inside_the_file():
+    rng = np.random.default_rng(0)
+    whole = b"RIFF" + struct.pack("<I", 136) + b"WAVEfmt " + struct.pack("<IHHIIHH", 16, 1, 1, RATE, 2 * RATE, 2, 16)
+    whole += b"data" + struct.pack("<I", 100) + bytes(100)
+    for _ in range(2000):
+        hurt = bytearray(whole[: rng.integers(12, len(whole) + 1)])
+        hurt[rng.integers(len(hurt))] = rng.integers(256)
+        found = find_samples(bytes(hurt))
+        assert found is None or 0 <= found.start <= max(found.stop, found.start) <= max(len(hurt), found.start)
+
+
+def test_corpus_and_speak_say_so(tmp_path, talker):
+    path = crashed(tmp_path / "take.wav", 0)
+    np.savez(tmp_path / "take.npz", frames=np.full((2 * bringing.FPS, 4), 0.2, np.float32), fps=float(bringing.FPS))
+    (tmp_path / "take.lab").write_text("0.5 pau\n1.3 aa\n2.0 pau\n", encoding="utf-8")
+    corpus = bringing.corpus_of(tmp_path)
+    report, account = bringing.added(corpus, path, tmp_path / "take.npz", tmp_path / "take.lab")
+    assert "all 64000 to the end" in report["remarks"]["take"][0]
+    assert "all 64000 to the end" in account
+    own = Corpus.open(corpus).files.audio("take")
+    assert len(load_audio(own)[0]) == len(SOUND)
+    crashed(own, 0)
+    (problem,) = [problem for problem in bringing.checked(corpus) if problem["file"] == "audio/take.wav"]
+    assert "all 64000 to the end" in problem["what"]
+    _, facts = bringing.spoken(talker, path, tmp_path, "--phones", tmp_path / "take.lab")
+    assert any("all 64000 to the end" in remark for remark in facts["remarks"])
