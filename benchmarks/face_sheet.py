@@ -12,9 +12,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from facesynth.face.draw.render import Renderer
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig, load_head, pose
 from facesynth.face.rig.markers import LipGap
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 MOUTH = (540, 380, 740, 560)
 FACE = (400, 0, 880, 720)

@@ -107,8 +107,9 @@ def test_our_own_live_link_comes_back_exactly(tmp_path):
     """Written, read and written again not a byte differs; imported as a recording it keeps all that the format holds."""
     from facesynth.corpus.importers.livelink import read_livelink_motion
     from facesynth.face.animation import FaceAnimation
-    from facesynth.face.files.timecode import timecode
-    from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_of
+    from facesynth.face.rig.arkit import gaze_of
+    from facesynth.motion.arkit_names import ARKIT_NAMES
+    from facesynth.motion.timecode import timecode
 
     values = take()
     first = LiveLinkTake(tuple(timecode(k / 60, 60) for k in range(len(values))), values.astype(np.float64), 60.0)

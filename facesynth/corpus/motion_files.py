@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.corpus.cells import read_cells
 from facesynth.corpus.importers.description import Written
 from facesynth.corpus.npz import read_npz
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.motion.cells import read_cells
 from facesynth.motion.irregular import USUAL_FPS
 from facesynth.motion.pose import remove_head, rigid_points
 from facesynth.motion.resample import resample

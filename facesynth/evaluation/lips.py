@@ -93,7 +93,7 @@ def paired_gaps(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:
 
 def _opening_on_head(motion: Motion) -> Array:
     """[T] opening (mm) that ARKit curves give the built-in head; curves that the layout lacks are 0."""
-    from facesynth.face.rig.arkit import ARKIT_NAMES
+    from facesynth.motion.arkit_names import ARKIT_NAMES
 
     known = [i for i, name in enumerate(motion.layout.names) if name in ARKIT_NAMES]
     if not {"jawOpen", "mouthClose"} & set(motion.layout.names):

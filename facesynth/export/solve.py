@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.solve.blendshapes import GAP_WEIGHT, MarkerBasis, follow_gap
 from facesynth.face.solve.bounded import SMOOTHING_S, solve
 from facesynth.inference.layout import Layout
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 STEPS = 6000
 SETTLED = 1e-8

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import unknown
 from facesynth.inference.speech import EmotionTrack
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.performer.articulation import Articulation
 from facesynth.performer.cues import Cues
 from facesynth.performer.targets import CURVES

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.arkit import gaze_weights
 from facesynth.face.rig.markers import LipGap
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import Speech
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.performer.articulation import Articulation, articulate
 from facesynth.performer.cues import Cues, listen
 from facesynth.performer.emotion import feel, show, sides

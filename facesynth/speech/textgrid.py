@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.atomic import write_text
+from facesynth.encoding import decoded
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.phone_labels import label_remarks
-from facesynth.speech.praat import decoded, read_grid
+from facesynth.speech.praat import read_grid
 from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of
 from facesynth.speech.tiers import following, tiers_of
 

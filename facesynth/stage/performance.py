@@ -14,13 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import quiet_eyes
 from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animation
-from facesynth.face.rig.arkit import ARKIT_NAMES, arkit_columns
+from facesynth.face.rig.arkit import arkit_columns
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.sway import quiet_head
 from facesynth.stage.request import Request
 

@@ -47,10 +47,10 @@ def write_c3d(path, points, fps=120.0, unit="mm", labels=None, sound=None, sound
 
 
 def livelink_text(frames=120, head=0.1):
-    from facesynth.corpus.importers.livelink import ANGLES, FIRST
+    from facesynth.motion.livelink import ANGLES, COUNT, TIMECODE
 
     names = ["EyeBlinkLeft", "EyeBlinkRight", "JawOpen"]
-    rows = [",".join([*FIRST, *names, *ANGLES])]
+    rows = [",".join([TIMECODE, COUNT, *names, *ANGLES])]
     for t in range(frames):
         weights = [0.25, 0.75, t / frames]
         angles = [head, -0.2, 0.05, 0.3, -0.1, 0.0, 0.1, -0.3, 0.0]

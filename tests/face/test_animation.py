@@ -5,12 +5,13 @@ import pytest
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import quiet_blinks, quiet_gaze
-from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_of, gaze_weights
+from facesynth.face.rig.arkit import gaze_of, gaze_weights
 from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 def still(rig, count=240, fps=60.0, **extra):

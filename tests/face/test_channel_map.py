@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from own_heads import MAPPING, SHAPES
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.channel_map import Channel, ChannelMap, arkit_name
 from facesynth.face.rig.mapping_file import read_mapping
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 def weights(**values):

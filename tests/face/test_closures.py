@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.markers import LipGap, marker_layout
 from facesynth.face.solve.animate import animate
 from facesynth.face.solve.closures import LARGEST_CLOSURE_MM, from_shut, with_lips_apart, with_lips_met
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 FPS = 50.0
 PHONES = PhoneTrack(("aa", "b", "aa", "s", "aa"), np.array([0.4, 0.5, 0.9, 1.0, 1.4]))

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import pose_points
 from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
 from facesynth.face.solve.animate import animate
@@ -10,6 +9,7 @@ from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of, si
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 SCALE = 1.15
 TURN = Rotation.from_rotvec([0.1, -0.15, 0.05]).as_matrix()

@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import pose
 from facesynth.face.rig.markers import LipGap, marker_layout, marker_vertices
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.draw.render import Renderer
 from facesynth.face.files.formats import write_animation
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.channel_map import on_channels
 from facesynth.face.rig.own_head import load_own_head
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 def animation(count=6):

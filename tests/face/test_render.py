@@ -6,9 +6,9 @@ from facesynth.face.draw.bake import baked_head
 from facesynth.face.draw.camera import Camera
 from facesynth.face.draw.occlusion import sky_directions, sky_visibility
 from facesynth.face.draw.render import Renderer
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import pose
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 SIZE = (160, 90)
 

@@ -4,9 +4,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.rig.anny import build_head, head_folder
-from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.arkit import gaze_weights
 from facesynth.face.rig.arkit_rig import PIVOT_MM, load_head, pose, pose_points
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 def weights(**values):

@@ -7,12 +7,12 @@ import pytest
 from click.testing import CliRunner
 
 from facesynth.cli.train import train
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONE_INDEX, VISEME_CLASSES
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.coarticulation.by_hand import SHIPPED, common_weights, from_table, read_shapes
 from facesynth.methods.registry import load
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 
 def saying(*pairs):

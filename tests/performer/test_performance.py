@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from acting import BILABIAL_RICH, act, hum, per_phone, speech_of
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import BILABIALS, OPEN_VOWELS
 from facesynth.inference.speech import EmotionTrack, Speech
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.performer.articulation import LOOSEST_MM
 from facesynth.performer.cues import listen
 from facesynth.performer.prosody import EMOTIONS

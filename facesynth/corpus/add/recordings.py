@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.corpus.add.transcripts import is_table
-from facesynth.corpus.importers.livelink import is_live_link
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.livelink import is_live_link
 from facesynth.speech.textgrid import is_silence_mark
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})

@@ -8,11 +8,12 @@ from facesynth.corpus.importers.articulography import is_articulography, read_ar
 from facesynth.corpus.importers.c3d import read_c3d
 from facesynth.corpus.importers.description import Written, description_beside
 from facesynth.corpus.importers.flame import is_flame, read_flame
-from facesynth.corpus.importers.livelink import is_live_link, read_livelink_motion
+from facesynth.corpus.importers.livelink import read_livelink_motion
 from facesynth.corpus.importers.reading import Reading, require_file
 from facesynth.corpus.importers.tables import load_mat, read_numbers, read_table
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.motion.livelink import is_live_link
 
 SUFFIXES = frozenset({".c3d", ".csv", ".npz", ".mat"})
 
@@ -36,7 +37,7 @@ def read(
     if suffix not in SUFFIXES:
         raise FacesynthError(f"{path} is none of {', '.join(sorted(SUFFIXES))}")
     if suffix == ".csv" and is_live_link(path):
-        return read_livelink_motion(path)
+        return read_livelink_motion(path, fps)
     if suffix == ".npz" and is_flame(arrays := read_numbers(path)):
         return read_flame(path, arrays)
     if suffix == ".mat" and is_articulography(load_mat(path)):

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.corpus.cells import is_number, read_names
 from facesynth.corpus.importers.description import ORDER, Written
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.motion_files import read_csv, shortened, time_column
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Kind, Layout
 from facesynth.inference.npz import read_all_arrays
+from facesynth.motion.cells import is_number, read_names
 
 CHANNELS = "channels.txt"
 """Beside weights: the names of the columns, one a line."""

@@ -10,8 +10,8 @@ from facesynth.face.draw.look import LitSphere, Look
 from facesynth.face.draw.occlusion import sky_visibility
 from facesynth.face.draw.raster import vertex_normals
 from facesynth.face.draw.shading import SKIN, Surface
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.own_head import OwnHead
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 GLOSS = 0.35
 OPEN_JAW = 0.45

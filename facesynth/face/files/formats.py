@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.own_head import OwnHead
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 Head = Rig | OwnHead
 Writer = Callable[[Path, FaceAnimation, Head, Motion | None], None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +10,14 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import write_text
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.files.timecode import exact_fps, nominal_rate, parse_timecodes, rate_of, timecode
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
+from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.motion.livelink import ANGLES, TIMECODE, WEIGHTS, read_take
+from facesynth.motion.livelink import COUNT as BLENDSHAPE_COUNT
+from facesynth.motion.timecode import nominal_rate, timecode
 
-ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
-HEADER = ("Timecode", "BlendshapeCount", *(name[0].upper() + name[1:] for name in ARKIT_NAMES), *ANGLES)
+HEADER = (TIMECODE, BLENDSHAPE_COUNT, *WEIGHTS, *ANGLES)
 COUNT = len(HEADER) - 2
 EYE_CURVES = tuple(name[0].lower() + name[1:] for name in ANGLES[3:])
 """What a motion calls the angles of each eye (rad, the app's signs), where it has them."""
@@ -80,46 +80,12 @@ def read_livelink(path: str | Path, fps: float | None = None) -> LiveLinkTake:
     The rate is read off the timecodes; a take of under a second does not show it and needs `fps`.
     """
     path = Path(path)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            header, *rows = [row for row in csv.reader(file) if row] or [[]]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
-    if tuple(header) != HEADER:
-        odd = next((got for got, wanted in zip(header, HEADER, strict=False) if got != wanted), f"{len(header)} columns")
-        raise FacesynthError(
-            f"{path} is no Live Link Face CSV: its header has {odd!r}; wanted {len(HEADER)} columns from Timecode on"
-        )
-    if not rows:
-        raise FacesynthError(f"{path} holds a header and no frames; record the take again")
-    values = _numbers(path, rows)
-    times = tuple(row[0] for row in rows)
-    return LiveLinkTake(times, values, fps if fps is not None else _fps(path, list(times)))
-
-
-def _numbers(path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
-    for i, row in enumerate(rows):
-        if len(row) != len(HEADER):
-            raise FacesynthError(f"{path} row {i + 2} has {len(row)} values; wanted {len(HEADER)}; was the take cut off?")
-    try:
-        values = np.array([row[2:] for row in rows], np.float64)
-    except ValueError as error:
-        raise FacesynthError(f"{path} holds a value that is no number ({error})") from None
-    if not np.isfinite(values).all():
-        raise FacesynthError(f"{path} holds NaN or infinite values; remove those rows")
-    return values
-
-
-def _fps(path: Path, timecodes: list[str]) -> float:
-    frames, seconds = parse_timecodes(timecodes)
-    rate = rate_of(frames, seconds)
-    if rate is None:
-        raise FacesynthError(f"{path} is too short to show its frame rate; give fps=")
-    total = (seconds[-1] - seconds[0]) % 86400 * rate + frames[-1] - frames[0]
-    if total <= 0:
-        raise FacesynthError(f"{path}: the timecodes do not increase; give fps=")
-    fps = rate * (len(timecodes) - 1) / total
-    return float(rate) if abs(fps - rate) < 1e-4 * rate else exact_fps(fps)
+    take = read_take(path, fps)
+    wanted = HEADER[2:]
+    if not take.has(wanted):
+        lacking = next(name for name in wanted if name not in take.names)
+        raise FacesynthError(f"{path} has no column {lacking!r}; wanted the {COUNT} of the app")
+    return LiveLinkTake(take.timecodes, take.rows(wanted), take.fps)
 
 
 # Signs: in takes of the app, EyeLookInLeft (the left eye looks to the performer's right) goes with positive

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.obj import ObjMesh, read_obj, read_target
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 PARTS: tuple[str, ...] = (
     "skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue",

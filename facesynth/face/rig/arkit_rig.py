@@ -13,9 +13,10 @@ from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.anny import PARTS, build_head, head_folder, head_key
-from facesynth.face.rig.arkit import ARKIT_NAMES, checked_weights, eye_rotations, gaze_weights
+from facesynth.face.rig.arkit import checked_weights, eye_rotations, gaze_weights
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 PIVOT_MM = np.array([0.0, -105.0, 35.0])
 """The head turns about this point, at the top of the neck."""

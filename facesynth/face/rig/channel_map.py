@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 _SIDES = {"l": "Left", "r": "Right"}
 RIDGE = 1e-4

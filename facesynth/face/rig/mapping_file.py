@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.channel_map import Channel, arkit_name
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 FIELDS = ("from", "gain", "offset", "limit", "mute")
 SECTIONS = ("channels", "head", "mm_per_unit")

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.lips import heights_between
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 HEAD_MARKERS: Mapping[str, tuple[tuple[str, int], ...]] = {
     "forehead": (

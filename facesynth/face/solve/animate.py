@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import EyeMotion, quiet_eyes
 from facesynth.face.behaviour.tongue import TIP_OUT, TIP_UP, tongue_track
-from facesynth.face.rig.arkit import ARKIT_NAMES, BLINKS, arkit_columns, gaze_of, gaze_weights
+from facesynth.face.rig.arkit import BLINKS, arkit_columns, gaze_of, gaze_weights
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
 from facesynth.face.rig.markers import LipGap, marker_vertices
 from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
@@ -17,6 +17,7 @@ from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.pose import rigid_points
 
 ALREADY_BLINKS = 0.5

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import marker_vertices
 from facesynth.face.solve.bounded import solve
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 if TYPE_CHECKING:
     from facesynth.face.solve.fitting import LayoutFit

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facesynth.face.rig.arkit import ARKIT_NAMES
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import HEAD_MARKERS, INNER_LIPS, marker_layout
 from facesynth.face.solve.landmark_names import KNOWN_POINTS, LANDMARKS
@@ -20,6 +19,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.lips import lip_gap
 from facesynth.inference.motion import Motion
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 Floats = NDArray[np.float64]
 

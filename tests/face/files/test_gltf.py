@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.formats import write_animation
-from facesynth.face.rig.arkit import ARKIT_NAMES, gaze_weights
+from facesynth.face.rig.arkit import gaze_weights
 from facesynth.face.rig.arkit_rig import pose
+from facesynth.motion.arkit_names import ARKIT_NAMES
 
 _spec = importlib.util.spec_from_file_location("gltf_rules", Path(__file__).with_name("gltf_rules.py"))
 gltf_rules = importlib.util.module_from_spec(_spec)

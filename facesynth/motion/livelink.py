@@ -1,0 +1,255 @@
+"""Takes of the Live Link Face app, as the app and those who came after it write them.
+
+A row a frame: the time of day, the number of values, weights of ARKit's shapes, and angles of head and eyes. Columns are found
+by their names, whatever their order and case; the numbers may be shares or per cent, the text of any encoding, with commas or
+semicolons. A row stands where its time code puts it: rows that were lost leave gaps, rows that are there twice are read once.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.encoding import decoded
+from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
+
+Floats = NDArray[np.float64]
+
+TIMECODE, COUNT = "Timecode", "BlendshapeCount"
+ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
+WEIGHTS = tuple(name[0].upper() + name[1:] for name in ARKIT_NAMES)
+"""As the app spells them."""
+FEWEST_SHAPES = 10
+"""A table with a column of time codes and so many of ARKit's shapes is a take as well."""
+HEAD_BYTES = 1 << 14
+"""Hold the first line of any such table."""
+PER_CENT = 2.0
+"""No weight of shares goes beyond it."""
+LARGEST_PER_CENT = 110.0
+CLIPPED = 1.001
+RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
+"""Frames that time codes count in a second."""
+SLOWEST = 23
+"""Frame numbers below it tell no rate: a take of half a second has such low ones too."""
+NOON_S, DAY_S = 43200, 86400
+LARGEST_GAP = 50
+"""Frames for each row: a table with larger gaps has damaged time codes."""
+_TIMECODE = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d)([:;.,])(\d{2,3})(?:[.,](\d+))?")
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A take as it stands in its file."""
+
+    timecodes: tuple[str, ...]
+    """R times of day."""
+    names: tuple[str, ...]
+    """N columns of numbers, spelled as the app does: weights and angles."""
+    values: Floats
+    """[R, N] weights as shares, angles in rad."""
+    frames: NDArray[np.int64]
+    """[R] number of the frame that each row shows, from 0 on."""
+    fps: float
+    """Hz."""
+    remarks: tuple[str, ...]
+    """What was assumed or repaired."""
+
+    @property
+    def weights(self) -> tuple[str, ...]:
+        """Names of the columns that are no angles."""
+        return tuple(name for name in self.names if name not in ANGLES)
+
+    def has(self, angles: Sequence[str]) -> bool:
+        """Whether the take holds these angles."""
+        return set(angles) <= set(self.names)
+
+    def rows(self, names: Sequence[str]) -> Floats:
+        """[R, …] columns by name, as they stand in the file."""
+        return self.values[:, [self.names.index(name) for name in names]]
+
+    def laid(self, rows: Floats) -> Floats:
+        """[T, C] rows [R, C] at their frames; NaN where one was lost."""
+        found = np.full((int(self.frames[-1]) + 1, rows.shape[1]), np.nan)
+        first = np.diff(self.frames, prepend=-1) > 0
+        found[self.frames[first]] = rows[first]
+        return found
+
+
+def is_live_link(path: Path) -> bool:
+    """Whether a table has the columns of a take, whatever their order, case and encoding."""
+    try:
+        with open(path, "rb") as file:
+            names = {name.lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:1])[0]}
+    except (OSError, UnicodeDecodeError, csv.Error, IndexError):
+        return False
+    shapes = sum(name.lower() in names for name in WEIGHTS)
+    return TIMECODE.lower() in names and (COUNT.lower() in names or shapes >= FEWEST_SHAPES)
+
+
+def read_take(path: Path, fps: float | None = None) -> Take:
+    """Read a take. Its rate is read off the time codes; one of under a second does not show it and needs `fps`.
+
+    FacesynthError, with the row where one is at fault, for what is no take, cut off, or has time codes that go back.
+    """
+    header, rows, remarks = _table(path)
+    names = [_spelled(name) for name in header]
+    timecodes = [row[names.index(TIMECODE)].strip() for row in rows]
+    columns = [k for k, name in enumerate(names) if name not in (TIMECODE, COUNT)]
+    values = _numbers(path, rows, columns)
+    named = tuple(names[k] for k in columns)
+    values, said = _as_shares(path, values, [name not in ANGLES for name in named])
+    times_s, counted = _times(path, timecodes, fps)
+    frames, rate = _placed(path, timecodes, times_s, counted, fps)
+    remarks += said + _lost_and_doubled(frames, values)
+    return Take(tuple(timecodes), named, values, frames, rate, tuple(remarks))
+
+
+def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
+    """Names of the columns, the rows below them, and what was noticed."""
+    try:
+        text, encoding = decoded(path.read_bytes())
+        header, *rows = _cells(text.splitlines()) or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
+    lower = [name.lower() for name in header]
+    known = sum(name.lower() in lower for name in (*WEIGHTS, *ANGLES))
+    if lower.count(TIMECODE.lower()) != 1 or "" in header or len(set(lower)) != len(lower) or not known:
+        odd = next((name for name in header if lower.count(name.lower()) > 1 or _spelled(name) == name.lower()), f"{header[:3]}")
+        raise FacesynthError(
+            f"{path} cannot be read as a Live Link Face CSV: its header has {odd[:60]!r}; wanted Timecode, BlendshapeCount,"
+            " weights and angles"
+        )
+    if not rows:
+        raise FacesynthError(f"{path} holds a header and no frames; record the take again")
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise FacesynthError(f"{path} row {number} has {len(row)} values; wanted {len(header)}; was the take cut off?")
+    return header, rows, [f"the text was taken for {encoding}"] if encoding else []
+
+
+def _cells(lines: Sequence[str]) -> list[list[str]]:
+    """Rows of a table with commas, semicolons or tabs; a comma within a cell is a decimal one."""
+    first = lines[0] if lines else ""
+    sign = next((sign for sign in (";", "\t") if first.count(sign) > first.count(",")), ",")
+    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=sign) if row]
+    return rows if sign == "," else [rows[0], *([cell.replace(",", ".") for cell in row] for row in rows[1:])] if rows else []
+
+
+_SPELLED = {name.lower(): name for name in (TIMECODE, COUNT, *WEIGHTS, *ANGLES)}
+
+
+def _spelled(name: str) -> str:
+    return _SPELLED.get(name.lower(), name)
+
+
+def _numbers(path: Path, rows: list[list[str]], columns: list[int]) -> Floats:
+    try:
+        values = np.array([[row[k] for k in columns] for row in rows], np.float64)
+    except ValueError as error:
+        raise FacesynthError(f"{path} holds a value that is no number ({error})") from None
+    if not np.isfinite(values).all():
+        raise FacesynthError(f"{path} holds NaN or infinite values; remove those rows")
+    return values
+
+
+def _as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floats, list[str]]:
+    """Values whose weights are shares of 1, and what was done."""
+    weights = values[:, are_weights]
+    highest = float(weights.max(initial=0.0))
+    if highest > LARGEST_PER_CENT or weights.min(initial=0.0) < -LARGEST_PER_CENT:
+        raise FacesynthError(f"{path} holds weights up to {max(highest, -weights.min()):g}; wanted 0 to 1, or per cent")
+    if highest > PER_CENT:
+        shares = np.where(are_weights, values / 100, values)
+        return shares, [f"weights go up to {highest:g}: they were taken as per cent and divided by 100"]
+    return values, [f"weights go up to {highest:g}: those over 1 are taken as 1"] if highest > CLIPPED else []
+
+
+def _times(path: Path, timecodes: list[str], fps: float | None) -> tuple[Floats, int]:
+    """[R] times in seconds, rising over midnight, and how many frames the time codes count in a second."""
+    fields = [_TIMECODE.fullmatch(text) for text in timecodes]
+    for row, (text, match) in enumerate(zip(timecodes, fields, strict=True), start=2):
+        if match is None:
+            raise FacesynthError(f"{path} row {row}: {text[:40]!r} is no time code; wanted HH:MM:SS:FF.mmm, or HH:MM:SS;FF")
+    found = [match for match in fields if match]
+    parts = np.array([[int(match[k]) for k in (1, 2, 3, 5)] for match in found], np.int64)
+    seconds = parts[:, :3] @ np.array([3600, 60, 1])
+    highest = int(parts[:, 3].max()) + 1
+    if fps is None and (highest < SLOWEST or len(np.unique(seconds)) < 2):
+        raise FacesynthError(f"{path} is too short to show its frame rate; give it (--fps)")
+    shown = max(highest, int(np.ceil(fps - 0.05)) if fps and len(np.unique(seconds)) < 2 else highest)
+    counted = min((rate for rate in RATES if rate >= shown), default=shown)
+    parted = parts[:, 3] + np.array([float(f"0.{match[6] or 0}") for match in found])
+    if any(match[4] == ";" for match in found):
+        return _over_midnight(_drop_frame(parts, counted) / (counted * 1000 / 1001)), counted
+    return _over_midnight(seconds + parted / counted), counted
+
+
+def _drop_frame(parts: NDArray[np.int64], counted: int) -> Floats:
+    """[R] frames since midnight of drop-frame time codes [R, 4].
+
+    Numbers 0 and 1 of 30 (0 to 3 of 60) are left out at each minute but every tenth, so that they stay with the clock.
+    """
+    hours, minutes, seconds, frames = parts.T
+    whole = 60 * hours + minutes
+    dropped = counted // 15 * (whole - whole // 10)
+    return (((60 * whole + seconds) * counted + frames) - dropped).astype(np.float64)
+
+
+def _over_midnight(times_s: Floats) -> Floats:
+    return times_s + DAY_S * np.cumsum(np.diff(times_s, prepend=times_s[0]) < -NOON_S)
+
+
+# Steps between time codes are whole multiples of a frame, give or take what the app's clock trembles. Each step is rounded by
+# itself, so that the frame's length need not be known well; that gives the rate, and the rate the place of each row.
+def _placed(
+    path: Path, timecodes: list[str], times_s: Floats, counted: int, fps: float | None
+) -> tuple[NDArray[np.int64], float]:
+    """[R] the frame that each row shows, and the rate."""
+    steps = np.diff(times_s)
+    back = np.flatnonzero(steps < -0.5 / counted)
+    if len(back):
+        row = int(back[0])
+        raise FacesynthError(
+            f"{path} row {row + 3}: the time code goes back from {timecodes[row]} to {timecodes[row + 1]}, as where two takes"
+            " were put together; cut the table there"
+        )
+    forward = steps[steps > 0.25 / counted]
+    if not len(forward):
+        if fps is None:
+            raise FacesynthError(f"{path}: the time codes do not increase; give the rate (--fps)")
+        return np.arange(len(times_s)), fps
+    usual = float(np.median(forward))
+    count = np.rint(steps / usual).sum()
+    rate = _exact(float(count / (times_s[-1] - times_s[0])), counted)
+    frames = np.rint((times_s - times_s[0]) * rate).astype(np.int64)
+    if frames[-1] > LARGEST_GAP * len(frames) + 1000:
+        raise FacesynthError(f"{path}: the time codes jump by hours, from {timecodes[0]} to {timecodes[-1]}; export it again")
+    return np.maximum.accumulate(frames), fps if fps is not None and abs(fps / rate - 1) < 1e-3 else rate
+
+
+def _exact(rate: float, counted: int) -> float:
+    """The rate of film or television that is meant."""
+    exact = [usual * slow for usual in (*RATES, counted) for slow in (1.0, 1000 / 1001)]
+    nearest = min(exact, key=lambda usual: abs(usual - rate))
+    return nearest if abs(nearest - rate) < 1e-4 * rate else rate
+
+
+def _lost_and_doubled(frames: NDArray[np.int64], values: Floats) -> list[str]:
+    again = np.flatnonzero(np.diff(frames) == 0)
+    remarks = []
+    if len(again):
+        same = np.count_nonzero((values[again] == values[again + 1]).all(axis=1))
+        what = "are there twice" if same == len(again) else f"share a frame with the one before ({same} of them the same)"
+        remarks.append(f"{len(again)} of {len(frames)} rows {what}; each frame was read once")
+    lost = int(frames[-1]) + 1 - len(np.unique(frames))
+    if lost:
+        remarks.append(f"{lost} of {int(frames[-1]) + 1} frames have no row by the time codes: they are gaps")
+    return remarks

@@ -1,0 +1,79 @@
+"""Takes with columns of any order, case, number and encoding: one reader finds them by name."""
+
+import bringing
+import numpy as np
+import pytest
+from takes import NAMES, timecodes_of, values_of, write
+
+from facesynth.corpus.importers.formats import read
+from facesynth.face.files.livelink import read_livelink
+from facesynth.inference.errors import FacesynthError
+from facesynth.motion.livelink import WEIGHTS, is_live_link
+
+CODES, VALUES = timecodes_of(120), values_of(120)
+
+
+def plain(folder):
+    return read(write(folder / "plain.csv", CODES, VALUES)).motion
+
+
+ODD = {
+    "utf-16": {"encoding": "utf-16"},
+    "utf-16 without a mark": {"encoding": "utf-16-le"},
+    "utf-8 with a mark": {"encoding": "utf-8-sig"},
+    "semicolons": {"sign": ";", "decimal": ","},
+    "tabs": {"sign": "\t"},
+    "lower case": {"names": tuple(name.lower() for name in NAMES), "first": ("timecode", "blendshapecount")},
+    "ARKit's case": {"names": tuple(name[0].lower() + name[1:] for name in NAMES), "first": ("Timecode", "BlendShapeCount")},
+    "UTF-16 with semicolons": {"encoding": "utf-16", "sign": ";", "decimal": ","},
+    "another order": {"order": np.random.default_rng(1).permutation(63)},
+}
+
+
+@pytest.mark.parametrize("kind", sorted(ODD))
+def test_the_same_take_in_every_dress(tmp_path, kind):
+    path = write(tmp_path / "a.csv", CODES, VALUES, **ODD[kind])
+    assert is_live_link(path)
+    got, wanted = read(path).motion, plain(tmp_path)
+    assert got.fps == wanted.fps
+    assert set(got.layout.names) == set(wanted.layout.names)
+    places = [got.layout.names.index(name) for name in wanted.layout.names]
+    np.testing.assert_allclose(got.frames[:, places], wanted.frames, atol=1e-7)
+    np.testing.assert_allclose(got.head, wanted.head, atol=1e-7)
+    np.testing.assert_allclose(got.eyes, wanted.eyes, atol=1e-7)
+    np.testing.assert_allclose(read_livelink(path).values, VALUES, atol=1e-9)
+
+
+def test_per_cent_is_told_and_divided(tmp_path):
+    hundredfold = np.concatenate([100 * VALUES[:, :52], VALUES[:, 52:]], axis=1)
+    path = write(tmp_path / "a.csv", CODES, hundredfold)
+    reading = read(path)
+    np.testing.assert_allclose(reading.motion.frames, plain(tmp_path).frames, atol=1e-6)
+    assert "taken as per cent and divided by 100" in reading.remarks[0]
+    np.testing.assert_allclose(read_livelink(path).values, VALUES, atol=1e-9)
+    with pytest.raises(FacesynthError, match="weights up to 25"):
+        read(write(tmp_path / "b.csv", CODES, 255 * VALUES))
+    loud = np.where(np.arange(61) == 17, 1.4 * VALUES, VALUES)
+    assert "those over 1 are taken as 1" in read(write(tmp_path / "c.csv", CODES, loud)).remarks[0]
+
+
+def test_the_52_weights_alone(tmp_path):
+    reading = read(write(tmp_path / "a.csv", CODES, VALUES[:, :52], WEIGHTS))
+    assert len(reading.motion.layout.names) == 52
+    assert reading.motion.head is None
+    assert reading.motion.eyes is None
+    assert "no angles of head and eyes" in reading.remarks[0]
+    np.testing.assert_allclose(reading.motion.frames, VALUES[:, :52], atol=1e-7)
+    without_count = read(write(tmp_path / "b.csv", CODES, VALUES[:, :52], WEIGHTS, first=("Timecode",)))
+    np.testing.assert_allclose(without_count.motion.frames, VALUES[:, :52], atol=1e-7)
+
+
+def test_corpus_add_reads_and_tells(tmp_path):
+    hundredfold = np.concatenate([100 * VALUES[:, :52], VALUES[:, 52:]], axis=1)
+    path = write(tmp_path / "take.csv", CODES, hundredfold, **ODD["UTF-16 with semicolons"])
+    bringing.save_wav(tmp_path / "take.wav", bringing.hum(2.0), bringing.RATE)
+    (tmp_path / "take.lab").write_text("0.5 pau\n1.3 aa\n2.0 pau\n", encoding="utf-8")
+    report, account = bringing.added(tmp_path / "c", path, tmp_path / "take.wav", tmp_path / "take.lab")
+    assert "taken as per cent" in " ".join(report["remarks"]["take"])
+    assert "taken as per cent" in account
+    assert not [problem for problem in bringing.checked(tmp_path / "c") if "per cent" in problem["what"]]
