@@ -69,6 +69,41 @@ def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     return np.asarray(np.isnan(values).any(axis=-1))
 
 
+FAR = 10.0
+"""A point further from the middle of all than this many times their usual distance is no place on the same body."""
+
+
+def filled_in(points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """[T, K] which of the points [T, K, 3] are no places but what programs write for a gap: 0, 0, 0, or a number far away.
+
+    Such numbers (-16512, 9999.999, 99999, …) stand in all three coordinates, or in one; a marker at exactly three zeros,
+    or metres from the face, there is none.
+    """
+    nothing = ~np.nan_to_num(points, nan=1.0).any(axis=2)
+    present = np.isfinite(points).all(axis=2) & ~nothing
+    alike = present & (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
+    likely = points[present & ~alike]
+    if len(likely) < 3:
+        return nothing
+    middle = np.median(likely, axis=0)
+    usual = float(np.median(np.abs(likely - middle).max(axis=1)))
+    away = np.abs(np.nan_to_num(points, posinf=np.inf, neginf=-np.inf) - middle).max(axis=2)
+    return np.asarray(
+        nothing | np.isinf(points).any(axis=2) | (present & (away > FAR * max(usual, 1e-9)) & (alike | _again(points)))
+    )
+
+
+def _again(points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """[T, K] which points have a coordinate whose value is the commonest extreme of all: no two measured ones are the same."""
+    found = np.zeros(points.shape[:2], bool)
+    for axis in range(points.shape[2]):
+        values = points[..., axis]
+        for extreme in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
+            same = values == extreme
+            found |= same if np.count_nonzero(same) > 1 else False
+    return found
+
+
 def runs(missing: NDArray[np.bool_], point: int = 0) -> list[Gap]:
     """The runs of True in a mask [T], in order."""
     edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))

@@ -9,7 +9,8 @@ import scipy.io
 from click.testing import CliRunner
 from corpora import tiny_utterances
 from interrupted import COMMAND, contents, killed_and_repeated
-from test_importers import articulography, hum, hurt, livelink_text, write_c3d
+from mocap_files import write_c3d
+from test_importers import articulography, hum, hurt, livelink_text
 
 from facesynth.cli import cli
 from facesynth.corpus import Corpus

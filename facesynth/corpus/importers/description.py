@@ -18,7 +18,13 @@ LAYOUT = "layout.yaml"
 """Beside recordings, or in their corpus."""
 FILES = "files"
 """The key of a layout file under which it says how files are written."""
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "inch": 25.4, "ft": 304.8}
+UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
+_SPELLED = {"um": ("µm", "μm", "micron", "microns"), "in": ("inch", "inches", '"', "''"), "ft": ("foot", "feet", "'")}
+_PREFIXES = {"um": "micro", "mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
+SPELLINGS = {spelled: unit for unit, spellings in _SPELLED.items() for spelled in spellings} | {
+    f"{prefix}{metre}{many}": unit for unit, prefix in _PREFIXES.items() for metre in ("metre", "meter") for many in ("", "s")
+}
+"""Other ways to write the units."""
 AXES = "xyz"
 ORDER = ("time", "points", "axes")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "\\t": "\t"}
@@ -48,8 +54,8 @@ class Written:
     """The column of a CSV that holds seconds."""
 
     def __post_init__(self) -> None:
-        if self.unit and self.unit.lower() not in UNITS_MM:
-            raise unknown("unit", self.unit, UNITS_MM)
+        if self.unit and unit_mm(self.unit) is None:
+            raise unknown("unit", self.unit, (*UNITS_MM, *SPELLINGS))
         if self.axes:
             axis_turns(self.axes)
         if self.order and (set(self.dimensions) - set(ORDER) or len(set(self.dimensions)) != len(self.dimensions)):
@@ -87,7 +93,7 @@ class Written:
 
     def placed(self, points: NDArray[Any], unit: str = "mm") -> NDArray[np.float64]:
         """Points [..., 3] (or [..., 2]) in mm and with our axes."""
-        scaled = np.asarray(points, np.float64) * UNITS_MM[(self.unit or unit).lower()]
+        scaled = np.asarray(points, np.float64) * (unit_mm(self.unit or unit) or 1.0)
         return turned(scaled, self.axes) if self.axes and points.shape[-1] == len(AXES) else scaled
 
     def over(self, other: Written) -> Written:
@@ -102,6 +108,12 @@ class Description:
     layout: Layout | None = None
     """None: the files name their channels."""
     written: Written = field(default_factory=Written)
+
+
+def unit_mm(unit: str) -> float | None:
+    """Millimetres of a unit, in any of its usual spellings; None for what is none."""
+    plain = unit.strip().strip("[]().").lower()
+    return UNITS_MM.get(SPELLINGS.get(plain, plain))
 
 
 def turned(points: NDArray[np.float64], axes: str) -> NDArray[np.float64]:
