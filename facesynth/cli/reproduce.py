@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import click
+
+TYPES = (".html", ".md", ".csv", ".json")
 
 
 @click.command("reproduce")
 @click.argument("paper")
 @click.argument("corpus", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="A .md, .csv or .json file to write as well.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="File to write: .html with pictures, .md, .csv or .json.",
+)
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes.")
 @click.option("--test-limit", type=click.IntRange(min=2), default=24, show_default=True, help="Utterances tested.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
@@ -36,10 +42,10 @@ def reproduce(
     from facesynth.evaluation.papers import reproduce as run
     from facesynth.inference.errors import unknown
 
-    if output and output.suffix not in (".md", ".csv", ".json"):
-        raise unknown("output type", output.suffix or str(output), (".md", ".csv", ".json"))
+    if output and output.suffix not in TYPES:
+        raise unknown("output type", output.suffix or str(output), TYPES)
     result = run(paper, Corpus.open(corpus), train_minutes=train_minutes, test_limit=test_limit, seed=seed)
-    plain = json.dumps(asdict(result), indent=1, ensure_ascii=False) + "\n"
+    plain = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     if output:
-        write_text(output, {".md": result.markdown(), ".csv": result.csv(), ".json": plain}[output.suffix])
+        write_text(output, plain if output.suffix == ".json" else result.written_as(output.suffix))
     click.echo(plain if as_json else result.markdown())

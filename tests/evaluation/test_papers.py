@@ -4,10 +4,12 @@ import io
 import pytest
 from corpora import tiny_corpus
 
-from facesynth.evaluation.papers import reproduce
+from facesynth.evaluation.papers import Material, reproduce
+from facesynth.evaluation.papers.deng2006_speech import DEGREES, coarticulation, eigenspace
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
 from facesynth.evaluation.papers.joined import joined, phones_until
 from facesynth.inference.errors import FacesynthError
+from facesynth.methods.coarticulation.transitions import PENALTIES
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +71,35 @@ def test_speech_as_long_as_a_paper_s_says_the_same_phones(corpus):
 def test_the_others_run(corpus, paper):
     result = reproduce(paper, corpus, test_limit=3)
     assert any(one.status == "measured" for one in result.findings)
+
+
+def test_the_dissertations_speech_is_measured_and_drawn(corpus):
+    sentences = sorted({r.sentence for r in corpus.records if r.emotion == "neutral"})
+    material = Material(corpus, corpus, corpus.subset(r.id for r in corpus.records if r.sentence == sentences[0]), 0)
+    degree, place, speed = coarticulation(material)
+    assert len(degree.ours.split(" / ")) == len(PENALTIES)
+    assert degree.ours.split(" / ")[0] == str(max(DEGREES))
+    assert degree.figure.startswith("data:image/")
+    assert place.figure.startswith("data:image/")
+    assert float(place.ours) > 0.5
+    assert speed.where == "fig. 5.18"
+    space = eigenspace(material)
+    assert 0 < float(space.ours.rstrip("%")) <= 100
+    neutral = corpus.subset(r.id for r in corpus.records if r.emotion == "neutral")
+    assert "in neutral alone" in eigenspace(Material(neutral, neutral, neutral, 0)).why
+
+
+def test_a_page_shows_every_figure_and_its_picture_and_files_hold_no_pictures():
+    rows = (
+        Finding("fig. 1", "a <curve>", "3", "4", False, "other", figure="data:image/png;base64,AAAA"),
+        not_implemented("fig. 2", "maps", "x", "missing"),
+    )
+    result = Reproduction("p", "P 2000", "Ours: nothing.", rows)
+    page = result.page()
+    assert 'src="data:image/png;base64,AAAA"' in page
+    assert "a &lt;curve&gt;" in page
+    assert "not implemented here: missing" in page
+    assert "base64" not in result.csv() + str(result.to_dict())
 
 
 def test_an_unknown_paper_is_answered_with_the_nearest(corpus):

@@ -6,6 +6,7 @@ import numpy as np
 
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.papers import Material
+from facesynth.evaluation.papers.deng2006_speech import coarticulation, eigenspace
 from facesynth.evaluation.papers.deng2008 import PUBLISHED, database, times, trajectories
 from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented
 from facesynth.evaluation.regions import lip_points
@@ -16,9 +17,6 @@ from facesynth.motion.pca import Pca
 PHONES = (14, 24, 33, 63)
 SECONDS = (137.67, 192.86, 371.50, 518.34)
 CHAPTERS = (
-    ("coarticulation", "fig. 5.8", "fitting error by degree of co-articulation curves", "best at 3"),
-    ("coarticulation", "§5.2.2", "expression eigenspace in 3 dimensions", "86.5 %"),
-    ("coarticulation", "fig. 5.18", "trajectories of the co-articulation model beside the recorded ones", "pictures"),
     ("maps", "figs 5.22 to 5.26", "phoneme Isomap maps beside PCA maps", "pictures"),
     ("head", "fig. 4.5", "sample-based head motion: training error by number of neighbours", "a curve"),
     ("head", "table 4.1", "head motion by HMM (K16 S3 M2 LR): Euler distance, CCA", "9.1°, 0.87"),
@@ -28,7 +26,6 @@ CHAPTERS = (
 )
 """Method, place, what, figure: of the dissertation's other chapters."""
 MISSING = {
-    "coarticulation": "co-articulation model",
     "maps": "maps of phonemes",
     "head": "method for head motion",
     "eyes": "method for eye motion",
@@ -43,6 +40,8 @@ def findings(material: Material) -> list[Finding]:
     return [
         *database(model, material, "§5.3"),
         mouth(material),
+        *coarticulation(material),
+        eigenspace(material),
         times(model, material, "table 5.2", PHONES, SECONDS, "2.66 GHz, 2006"),
         *trajectories(spoken, "figs 5.30, 5.31"),
         *missing(),

@@ -6,10 +6,14 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Literal
+from html import escape
+from typing import Any, Literal
 
 Status = Literal["measured", "not available", "not implemented"]
 COLUMNS = ("where", "what", "paper", "ours", "comparable", "why", "status")
+
+
+STYLE = "body{max-width:60em;margin:2em auto;font:15px/1.5 sans-serif}h2{font-size:1.05em;margin-top:2em}img{max-width:100%}"
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,8 @@ class Finding:
     why: str = ""
     """Why they can or cannot be compared, or why there is no figure of ours."""
     status: Status = "measured"
+    figure: str = ""
+    """A picture as a data URI, for the page."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +65,37 @@ class Reproduction:
         text = io.StringIO()
         writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        writer.writerows([asdict(one) | {"comparable": "yes" if one.comparable else "no"} for one in self.findings])
+        writer.writerows([plain(one) | {"comparable": "yes" if one.comparable else "no"} for one in self.findings])
         return text.getvalue()
+
+    def written_as(self, suffix: str) -> str:
+        """The content of a file: .html, .md or .csv."""
+        return self.page() if suffix == ".html" else self.csv() if suffix == ".csv" else self.markdown()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON can hold it, without pictures."""
+        return {**vars(self), "findings": [plain(one) for one in self.findings]}
+
+    def page(self) -> str:
+        """One page (HTML) that needs no other file: every figure of the paper with ours, and its picture where one is drawn."""
+        shown = "\n".join(_section(one) for one in self.findings)
+        head = f"<h1>{escape(self.paper)}</h1><p>{escape(self.reference)}</p><p>{escape(self.setting)}</p>"
+        title = f'<meta charset="utf-8"><title>{escape(self.paper)}</title><style>{STYLE}</style>'
+        return f'<!doctype html><html lang="en">{title}{head}\n{shown}</html>\n'
+
+
+def plain(one: Finding) -> dict[str, Any]:
+    """A finding without its picture."""
+    return {key: value for key, value in asdict(one).items() if key != "figure"}
+
+
+def _section(one: Finding) -> str:
+    title = f"<h2>{escape(one.where)}: {escape(one.what)}</h2>"
+    if one.status != "measured":
+        return f"{title}<p>paper: {escape(one.paper)}; {one.status} here: {escape(one.why)}</p>"
+    verdict = f"{'comparable' if one.comparable else 'not comparable'}: {escape(one.why)}"
+    picture = f'<img src="{one.figure}" alt="{escape(one.what)}">' if one.figure else ""
+    return f"{title}<p>paper: {escape(one.paper)}; ours: <b>{escape(one.ours)}</b></p><p>{verdict}</p>{picture}"
 
 
 def not_implemented(where: str, what: str, paper: str, why: str) -> Finding:
