@@ -53,6 +53,7 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
     from facesynth.performer.build import build_performer
+    from facesynth.stage.cast import Cast
     from facesynth.stage.performance import HeadStage
     from facesynth.stage.request import Request
 
@@ -65,7 +66,7 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
     speech = _speech(seed)
     clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
     stage = HeadStage.of(request)
-    performance = stage.perform(model.synthesize(speech, seed=seed), speech)
+    performance = stage.perform(model.synthesize(speech, seed=seed), speech, Cast(model))
     clock.step("motion", f"{len(performance.motion)} frames of motion at {performance.motion.fps:g} fps, on the head")
     written = [output / f"demo{suffix}" for suffix in (".csv", ".glb", ".npz", ".mp4")]
     for path in written:

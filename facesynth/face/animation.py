@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,8 @@ class FaceAnimation:
     """[T] root mean square distance of the solved markers from the asked ones, where weights were solved."""
     ranges: NDArray[Any] | None = None
     """[N, 2] lowest and highest weight of channels that have limits of their own; 0..1 without."""
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """Who moves each part of the face: mouth, head, eyes; empty where that is not known."""
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.weights))

@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.capabilities import Explaining, Expressing, MappingEmotions
 from facesynth.methods.method import Method
 from facesynth.methods.registry import able, ask, load, read_option, require, require_option
-from facesynth.motion.resample import resample
 from facesynth.stage.request import AUTO, Part, Request
 
 if TYPE_CHECKING:
@@ -58,21 +54,12 @@ class Cast:
         return {name: read_option(mover, name, value, phones) for name, value in asked.items()}
 
     def motion(self, speech: Speech, request: Request, options: dict[str, Any]) -> Motion:
-        """Of the mouth, at its own rate: with emotions added, or mapped to another, where that was asked for.
-
-        Head and eyes are those of their models.
-        """
+        """Of the mouth, at its own rate: with emotions added, or mapped to another, where that was asked for."""
         motion = self.mouth.synthesize(self._said(speech), seed=request.seed, **options)
         if self.expression is not None:
             motion = require(self.expression, Expressing).express(motion, speech, seed=request.seed)
         if self.mapper is not None and request.to_emotion is not None:
             motion = self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
-        if self.head is not None:
-            own = self.options(request, speech.phones, self.head)
-            motion = replace(motion, head=at_clock(self.head.synthesize(speech, seed=request.seed, **own), motion).head)
-        if self.eyes is not None:
-            own = self.options(request, speech.phones, self.eyes)
-            motion = replace(motion, eyes=at_clock(self.eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
         return motion
 
     def _said(self, speech: Speech) -> Speech:
@@ -81,15 +68,6 @@ class Cast:
             return speech
         plain = NEUTRAL if NEUTRAL in self.mouth.emotions else self.mouth.emotions[0]
         return replace(speech, emotions=EmotionTrack.constant(plain, speech.duration_s))
-
-
-def at_clock(part: Motion, motion: Motion) -> Motion:
-    """Head and eyes of one motion at the frames of another, which may be a frame longer: there they are held."""
-    still = np.zeros((len(part), 1), np.float32)
-    there = resample(replace(part, frames=still, layout=Layout("curves", ("still",))), motion.fps)
-    at = np.minimum(np.arange(len(motion)), len(there) - 1)
-    head, eyes = (None if value is None else value[at] for value in (there.head, there.eyes))
-    return replace(there, frames=there.frames[at], head=head, eyes=eyes)
 
 
 def cast_for(mouth: Method, request: Request) -> Cast:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,11 +20,14 @@ from facesynth.methods.method import Method
 from facesynth.motion.planar import picture_points
 from facesynth.motion.resample import resample
 from facesynth.progress import track
+from facesynth.stage.cast import Cast
 from facesynth.stage.performance import Written
 from facesynth.stage.request import Part, Request
 from facesynth.stage.speaker_pictures import load_face
+from facesynth.stage.whole_face import described
 
 OUTPUTS = (".mp4", ".npz")
+OF_PICTURES = "as in the speaker's pictures"
 
 
 def check_picture_output(path: Path) -> None:
@@ -42,6 +45,8 @@ class Likeness:
     """Shapes of the followed points, at the rate of the model."""
     speaker: Speaker
     choice: Choice
+    sources: Mapping[str, str]
+    """Who moves each part of the face."""
 
     def write(self, path: Path) -> Written:
         """Write the video, at the rate and size of the speaker's pictures, or the shapes."""
@@ -76,9 +81,10 @@ class PictureStage:
         warning = f"{', '.join(idle)}: a real face keeps the rate, size, head and eyes of its pictures"
         return cls(load_face(mouth), request, (warning,) if idle else ())
 
-    def perform(self, motion: Motion, speech: Speech) -> Likeness:
+    def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Likeness:
         """Put a motion on the face."""
-        return Likeness(speech, motion, self.speaker, self.request.pictures)
+        sources = {"mouth": described(cast.mouth), "head": OF_PICTURES, "eyes": OF_PICTURES}
+        return Likeness(speech, motion, self.speaker, self.request.pictures, sources)
 
 
 def likeness(motion: Motion, speaker: Speaker, report: Report, choice: Choice = "coherent") -> Iterator[NDArray[np.uint8]]:

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.behaviour.eyes import quiet_eyes
 from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animation
 from facesynth.face.rig.arkit import arkit_columns
 from facesynth.face.rig.arkit_rig import Rig
@@ -20,10 +19,11 @@ from facesynth.face.solve.animate import animate
 from facesynth.inference.errors import unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.inference.speech import Speech
 from facesynth.motion.arkit_names import ARKIT_NAMES
-from facesynth.motion.sway import quiet_head
+from facesynth.stage.cast import Cast
 from facesynth.stage.request import Request
+from facesynth.stage.whole_face import whole_face
 
 if TYPE_CHECKING:
     from facesynth.face.deform.skin import MarkerSkin
@@ -58,7 +58,7 @@ class Performance:
 
     speech: Speech
     motion: Motion
-    """What the models made, at its own rate."""
+    """What the models made, head and eyes among it, at the mouth's rate."""
     animation: FaceAnimation
     """The same on the built-in head, at the rate asked for."""
     head: Rig | OwnHead
@@ -67,6 +67,11 @@ class Performance:
     """Of the video, px."""
     skin: MarkerSkin | None = None
     """The skin as the markers move it, in place of the weights, where that was asked for."""
+
+    @property
+    def sources(self) -> Mapping[str, str]:
+        """Who moves each part of the face."""
+        return self.animation.sources
 
     def write(self, path: Path) -> Written:
         """Write one output; the suffix says which. It appears whole or not at all."""
@@ -110,27 +115,16 @@ class HeadStage:
         own = load_own_head(request.rig, request.mapping) if request.rig else None
         return cls(load_head(), own, request, tuple(f"{own.source.name}: {remark}" for remark in own.remarks) if own else ())
 
-    def perform(self, motion: Motion, speech: Speech) -> Performance:
-        """Put a motion on the head, at the rate asked for."""
+    def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Performance:
+        """Put a mouth's motion on the head, with what moves head and eyes beside it, at the rate asked for."""
         asked = self.request
-        motion = self._as_arkit(motion)
+        face = whole_face(cast, self._as_arkit(motion), speech, asked)
         animation = animate(
-            self._with_head(motion, speech),
-            self.rig,
-            head_gain=asked.head.factor,
-            eyes_gain=asked.eyes.factor,
-            seed=asked.seed,
-            phones=speech.phones,
-            eyes=still_eyes if asked.eyes.source == "recorded" else quiet_eyes,
+            face.motion, self.rig, eyes_gain=asked.eyes.factor, seed=asked.seed, phones=speech.phones, eyes=face.eyes
         ).resampled(float(asked.fps or FPS))
-        skin = self._skin(motion, animation)
-        return Performance(speech, motion, animation, self.own or self.rig, asked.size or SIZE, skin)
-
-    def _with_head(self, motion: Motion, speech: Speech) -> Motion:
-        """The motion's own head, or a quiet sway with nods where the voice is loud."""
-        if motion.head is not None or self.request.head.source != "default":
-            return motion
-        return replace(motion, head=quiet_head(len(motion), motion.fps, loudness(speech, motion), self.request.seed))
+        animation = replace(animation, sources=face.sources)
+        skin = self._skin(face.motion, animation)
+        return Performance(speech, face.motion, animation, self.own or self.rig, asked.size or SIZE, skin)
 
     def _as_arkit(self, motion: Motion) -> Motion:
         """Curves under own names as ARKit's, where a mapping says how and the head that is shown has not the same names."""
@@ -154,17 +148,3 @@ class HeadStage:
         from facesynth.face.deform.skin import marker_skin
 
         return marker_skin(self.request.deform, self.rig, motion, animation)
-
-
-def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
-    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
-    window = max(int(0.03 * speech.sample_rate), 1)
-    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
-    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
-    level = np.sqrt(power[at])
-    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)
-
-
-def still_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
-    """An `EyeMotion` that leaves the eyes open and straight."""
-    return np.tile([1.0, 0.0, 0.0], (len(head), 1))

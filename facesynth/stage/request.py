@@ -30,8 +30,8 @@ class Part:
     """Who moves a part of the face beside the mouth, and how much."""
 
     source: Source = "default"
-    """`recorded`: as the mouth's model knows it from its recordings, else still; `default`: the same, else quietly by
-    chance; `off`: still; `model`: as a model of this part alone says."""
+    """`recorded`: as the mouth's model knows it from its recordings, else still; `default`: the same, else as the
+    package knows it from other people; `off`: still; `model`: as a model of this part alone says."""
     gain: float = 1.0
     """Factor on the motion."""
     model: Path | None = None

@@ -27,6 +27,11 @@ from facesynth.stage.request import Request
 class Shown(Protocol):
     """An utterance on a face."""
 
+    @property
+    def sources(self) -> Mapping[str, str]:
+        """Who moves each part of the face."""
+        ...
+
     def write(self, path: Path) -> Written:
         """Write one output; the suffix says which."""
         ...
@@ -40,8 +45,8 @@ class Stage(Protocol):
         """What was asked for in vain."""
         ...
 
-    def perform(self, motion: Motion, speech: Speech) -> Shown:
-        """Put a motion on the face."""
+    def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Shown:
+        """Put a mouth's motion on the face, with what moves beside it."""
         ...
 
 
@@ -80,8 +85,9 @@ class Production:
         heard = listen(recording, self.cast, self.request, remark)
         options = self.cast.options(self.request, heard.speech.phones)
         motion = self.cast.motion(heard.speech, self.request, options)
-        shown = self.stage.perform(motion, heard.speech)
-        facts = self._account(heard.speech, options, remark)
+        shown = self.stage.perform(motion, heard.speech, self.cast)
+        facts = self._account(heard.speech, options, remark) | {"parts": dict(shown.sources)}
+        remark("; ".join(f"{part}: {source}" for part, source in shown.sources.items()))
         written = [*self._explain(heard.speech, options)]
         for target in targets:
             done = shown.write(target)

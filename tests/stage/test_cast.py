@@ -8,8 +8,8 @@ import pytest
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.stage.cast import at_clock
 from facesynth.stage.request import Part
+from facesynth.stage.whole_face import at_clock
 
 LAYOUT = Layout("curves", ("jawOpen",))
 

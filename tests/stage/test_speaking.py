@@ -42,7 +42,11 @@ def test_a_model_says_a_recording(shop, tmp_path):
     assert set(spoken.speech.emotions.labels) == {"happy"}
     assert spoken.written == (tmp_path / "a.npz",)
     assert json.loads(json.dumps(spoken.facts))["phones"] == "textgrid"
-    assert spoken.remarks == (f"{tmp_path / 'a.npz'}: {spoken.speech.duration_s:.2f} s at 25 fps",)
+    assert spoken.remarks[1:] == (f"{tmp_path / 'a.npz'}: {spoken.speech.duration_s:.2f} s at 25 fps",)
+    assert animation.sources == spoken.facts["parts"]
+    assert set(animation.sources) == {"mouth", "head", "eyes"}
+    assert animation.sources["mouth"] == "phone_mean (model.safetensors)"
+    assert spoken.remarks[0] == "; ".join(f"{part}: {source}" for part, source in spoken.facts["parts"].items())
 
 
 def test_without_a_file_there_is_the_motion_alone(shop):

@@ -24,6 +24,11 @@ class EyeMotion(Protocol):
         ...
 
 
+def still_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
+    """An `EyeMotion` that leaves the eyes open and straight."""
+    return np.tile([1.0, 0.0, 0.0], (len(head), 1))
+
+
 BLINK_MEDIAN_S, BLINK_SPREAD = 3.0, 0.5
 """Pauses between blinks are log-normal: median 3.0 s, deviation .5 of the logarithm, so 17 blinks a minute.
 

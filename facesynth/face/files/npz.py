@@ -14,13 +14,14 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.npz import read_arrays
 
 _ANIMATION = ("names", "weights", "head", "gaze", "tongue_up", "fps")
-_BESIDE = ("residual_mm", "frames", "frames_fps", "frames_head", "frames_eyes", "layout")
+_BESIDE = ("residual_mm", "ranges", "sources", "frames", "frames_fps", "frames_head", "frames_eyes", "layout")
 
 
 def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None = None) -> None:
     """Write the animation, and beside it the motion it was made from, each at its own rate.
 
-    Keys: names, weights, head, gaze, tongue_up, fps, residual_mm, ranges; frames, frames_fps, frames_head,
+    Keys: names, weights, head, gaze, tongue_up, fps, residual_mm, ranges, sources (JSON text: who moves
+    which part of the face); frames, frames_fps, frames_head,
     frames_eyes and layout (JSON text) of the motion.
     """
     arrays: dict[str, np.ndarray] = {"names": np.array(animation.names), "weights": animation.weights, "head": animation.head}
@@ -28,6 +29,8 @@ def write_npz(path: str | Path, animation: FaceAnimation, motion: Motion | None 
     for name in ("residual_mm", "ranges"):
         if getattr(animation, name) is not None:
             arrays[name] = getattr(animation, name)
+    if animation.sources:
+        arrays["sources"] = np.array(json.dumps(dict(animation.sources), sort_keys=True))
     if motion is not None:
         arrays |= {"frames": motion.frames, "frames_fps": np.array(motion.fps)}
         arrays["layout"] = np.array(json.dumps(motion.layout.to_dict(), sort_keys=True))
@@ -51,6 +54,7 @@ def read_npz(path: str | Path) -> tuple[FaceAnimation, Motion | None]:
         float(arrays["fps"]),
         arrays.get("residual_mm"),
         arrays.get("ranges"),
+        json.loads(str(arrays["sources"])) if "sources" in arrays else {},
     )
     return animation, _motion(arrays) if "frames" in arrays else None
 

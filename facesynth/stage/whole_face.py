@@ -1,0 +1,134 @@
+"""One whole face of what several models make: mouth first, then the head, then the eyes, which go with the head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.face.behaviour.eyes import EyeMotion, still_eyes
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack, Speech
+from facesynth.methods.capabilities import Accounting, Looking
+from facesynth.methods.method import Method
+from facesynth.methods.registry import ask, load
+from facesynth.motion.resample import resample
+from facesynth.motion.sway import quiet_head
+from facesynth.stage.cast import Cast
+from facesynth.stage.request import Request
+
+PACKAGED_EYES = Path(__file__).with_name("eyes.safetensors")
+"""Comes with the package; the README beside it says from whom it learned."""
+
+
+@dataclass(frozen=True, eq=False)
+class WholeFace:
+    """A motion with the head and eyes of whoever moves them."""
+
+    motion: Motion
+    eyes: EyeMotion
+    """Moves the eyes where the motion shows none of its own."""
+    sources: Mapping[str, str]
+    """Who moves the mouth, the head and the eyes, and who adds expression to it."""
+
+
+def whole_face(cast: Cast, motion: Motion, speech: Speech, request: Request) -> WholeFace:
+    """Head and eyes beside a mouth's motion, with the factors that were asked for: what the eyes go with is what is shown."""
+    sources = {"mouth": described(cast.mouth)}
+    if cast.expression is not None:
+        sources["expression"] = described(cast.expression)
+    motion, sources["head"] = _with_head(cast, motion, speech, request)
+    motion, eyes, sources["eyes"] = _with_eyes(cast, motion, speech, request)
+    return WholeFace(motion, eyes, sources)
+
+
+def described(model: Method) -> str:
+    """A model by its method and file."""
+    return model.name if model.path is None else f"{model.name} ({model.path.name})"
+
+
+def _with_head(cast: Cast, motion: Motion, speech: Speech, request: Request) -> tuple[Motion, str]:
+    if request.head.source == "off":
+        return replace(motion, head=None), "off"
+    if cast.head is not None:
+        own = cast.options(request, speech.phones, cast.head)
+        head = at_clock(cast.head.synthesize(speech, seed=request.seed, **own), motion).head
+        return replace(motion, head=scaled(head, request.head.gain)), described(cast.head)
+    if motion.head is not None:
+        return replace(motion, head=scaled(motion.head, request.head.gain)), "as the mouth's model recorded it"
+    if request.head.source == "recorded":
+        return motion, "still: none was recorded"
+    swaying = quiet_head(len(motion), motion.fps, loudness(speech, motion), request.seed)
+    return replace(motion, head=scaled(swaying, request.head.gain)), "sway and nods by constants"
+
+
+def _with_eyes(cast: Cast, motion: Motion, speech: Speech, request: Request) -> tuple[Motion, EyeMotion, str]:
+    if request.eyes.source == "off":
+        return motion, still_eyes, "off"
+    if cast.eyes is not None:
+        said = described(cast.eyes) + _account(cast.eyes, speech, request)
+        return _looking(cast, cast.eyes, motion, speech, request), still_eyes, said
+    if motion.eyes is not None:
+        return motion, still_eyes, "as the mouth's model recorded them"
+    if request.eyes.source == "recorded":
+        return motion, still_eyes, "as the mouth's motion shows them, else still"
+    return motion, packaged_eyes, "as the mouth's motion shows them, else grown from recorded ones of the package"
+
+
+def _looking(cast: Cast, eyes: Method, motion: Motion, speech: Speech, request: Request) -> Motion:
+    """The motion with the eyes of their own model, which turns the head only where the head is not held still."""
+    if (looking := ask(eyes, Looking)) is None:
+        own = cast.options(request, speech.phones, eyes)
+        return replace(motion, eyes=at_clock(eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
+    looked = looking.look(motion, seed=request.seed)
+    return replace(looked, head=motion.head) if request.head.source == "off" else looked
+
+
+def _account(model: Method, speech: Speech, request: Request) -> str:
+    if (accounting := ask(model, Accounting)) is None:
+        return ""
+    facts = accounting.account(speech, seed=request.seed).facts
+    return ": " + ", ".join(f"{name} {value}" for name, value in facts.items())
+
+
+def packaged_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
+    """An `EyeMotion` of the model that comes with the package."""
+    still = Motion(np.zeros((len(head), 1), np.float32), fps, Layout("curves", ("still",)), head.astype(np.float32))
+    eyes = _packaged().look(still, seed=seed).eyes
+    return np.zeros((0, 3)) if eyes is None else eyes.astype(np.float64)
+
+
+@cache
+def _packaged() -> Looking:
+    model = ask(load(PACKAGED_EYES), Looking)
+    if model is None:
+        raise TypeError(f"{PACKAGED_EYES} moves no eyes")
+    return model
+
+
+def scaled(head: NDArray[np.float32] | None, gain: float) -> NDArray[np.float32] | None:
+    """A head [T, 6] that turns and shifts by a factor."""
+    return None if head is None else (gain * head).astype(np.float32)
+
+
+def at_clock(part: Motion, motion: Motion) -> Motion:
+    """Head and eyes of one motion at the frames of another, which may be a frame longer: there they are held."""
+    still = np.zeros((len(part), 1), np.float32)
+    there = resample(replace(part, frames=still, layout=Layout("curves", ("still",))), motion.fps)
+    at = np.minimum(np.arange(len(motion)), len(there) - 1)
+    head, eyes = (None if value is None else value[at] for value in (there.head, there.eyes))
+    return replace(there, frames=there.frames[at], head=head, eyes=eyes)
+
+
+def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
+    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
+    window = max(int(0.03 * speech.sample_rate), 1)
+    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
+    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
+    level = np.sqrt(power[at])
+    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)

@@ -1,0 +1,87 @@
+"""Mouth, head and eyes of several models make one face, and it says who moves what."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from corpora import tiny_layout, tiny_utterances
+from living_eyes import learnt, recording
+
+from facesynth.face.behaviour.eyes import still_eyes
+from facesynth.inference.eyes import at_rest
+from facesynth.methods.model_file import read_header
+from facesynth.methods.registry import capabilities_of, load
+from facesynth.stage.cast import Cast
+from facesynth.stage.request import Part, Request
+from facesynth.stage.whole_face import PACKAGED_EYES, packaged_eyes, whole_face
+
+
+class Mouth:
+    """A mouth that only has a name here."""
+
+    name, path = "mouth", None
+
+
+@pytest.fixture(scope="module")
+def speech():
+    return tiny_utterances(1, 60, seed=3)[0][1]
+
+
+@pytest.fixture(scope="module")
+def motion(speech):
+    return at_rest(tiny_layout(), int(speech.phones.frame_bounds(60)[-1]), 60.0)
+
+
+@pytest.fixture(scope="module")
+def eyes():
+    return learnt(recording(seed=1))
+
+
+def face(motion, speech, mover=None, **parts):
+    return whole_face(Cast(Mouth(), eyes=mover), motion, speech, Request(**parts))
+
+
+def test_eyes_of_a_model_go_with_the_head_as_it_is_shown(motion, speech, eyes):
+    nodding = replace(motion, head=recording(len(motion) / 60).head[: len(motion)])
+    for gain in (0.5, 2.0):
+        made = face(nodding, speech, eyes, head=Part(gain=gain))
+        shown = replace(motion, head=gain * nodding.head)
+        assert made.motion.eyes == pytest.approx(eyes.look(shown).eyes, abs=1e-6)
+        assert made.motion.head == pytest.approx(eyes.look(shown).head, abs=1e-6)
+    assert made.sources["head"] == "as the mouth's model recorded it"
+    assert made.sources["eyes"].startswith("eyes: patches ")
+
+
+def test_a_part_that_is_off_is_still_whoever_else_moves(motion, speech, eyes):
+    nodding = replace(motion, head=recording(len(motion) / 60).head[: len(motion)])
+    made = face(nodding, speech, eyes, head=Part("off"))
+    assert made.motion.head is None
+    assert made.sources["head"] == "off"
+    without = face(nodding, speech, eyes, eyes=Part("off"))
+    assert without.eyes is still_eyes
+    assert without.motion.eyes is None
+
+
+def test_what_nobody_recorded_is_named_as_what_it_is(motion, speech):
+    made = face(motion, speech)
+    assert made.eyes is packaged_eyes
+    assert "constants" in made.sources["head"] or "package" in made.sources["head"]
+    assert "package" in made.sources["eyes"]
+    still = face(motion, speech, head=Part("recorded"), eyes=Part("recorded"))
+    assert still.motion.head is None
+    assert still.eyes is still_eyes
+    assert "still" in still.sources["head"]
+
+
+def test_the_packages_eyes_live_and_say_from_whom_they_are():
+    header = read_header(PACKAGED_EYES)
+    assert capabilities_of(header["method"]).part == "eyes"
+    assert PACKAGED_EYES.stat().st_size < 2e6
+    assert len(header["provenance"]["sources"]) == len(header["provenance"]["licences"]) == 2
+    card = PACKAGED_EYES.with_suffix(".md").read_text(encoding="utf-8")
+    assert all(source in card for source in header["provenance"]["sources"])
+    made = packaged_eyes(np.zeros((60 * 60, 6)), 60.0, None, 0)
+    assert ((made[1:, 0] < 0.2) & (made[:-1, 0] >= 0.2)).sum() in range(8, 50)
+    assert 0.5 < np.degrees(made[:, 1:].std(axis=0)).min() < np.degrees(made[:, 1:].std(axis=0)).max() < 12
+    assert json.dumps(load(PACKAGED_EYES).facts)
