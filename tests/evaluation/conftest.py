@@ -3,6 +3,8 @@
 import pytest
 
 from facesynth.evaluation import jobs
+from facesynth.methods import registry
+from facesynth.methods.capabilities import Capabilities
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -11,3 +13,14 @@ def no_process_for_memory():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "peak_speaking_mb", lambda *_: 123.0)
         yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def toy_methods(request):
+    """The methods that a file of tests calls TOYS are known while it runs, and to no other file."""
+    toys = getattr(request.module, "TOYS", {})
+    for name, cls in toys.items():
+        registry.register(Capabilities(name))(cls)
+    yield
+    for name in toys:
+        del registry._CLASSES[name]

@@ -18,15 +18,12 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
-from facesynth.methods.capabilities import Capabilities
-from facesynth.methods.registry import register
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
 COSTS = ("train_s", "train_cpu_s", "train_minutes", "rtf", "rtf_cpu", "peak_mb", "model_mb")
 CLOCKS = ("train_s", "train_cpu_s", "rtf", "rtf_cpu", "peak_mb")
 
 
-@register(Capabilities("telling"))
 class Telling(PhoneMean):
     """Phone mean that tells something of itself, as a concatenative method would."""
 
@@ -37,7 +34,6 @@ class Telling(PhoneMean):
         return speech.phones.frame_bounds(self.fps)[1:-1]
 
 
-@register(Capabilities("drawing"))
 class Drawing(MeanFace):
     """A method that draws where it holds the face: the first channel lies off by a normal number of 2 units."""
 
@@ -48,13 +44,16 @@ class Drawing(MeanFace):
         return Motion(frames, motion.fps, motion.layout)
 
 
-@register(Capabilities("short"))
 class Short(MeanFace):
     """A method that forgets the last frame."""
 
     def synthesize(self, speech, *, seed=0, **options):
         motion = super().synthesize(speech)
         return Motion(motion.frames[:-1], motion.fps, motion.layout)
+
+
+TOYS = {"telling": Telling, "drawing": Drawing, "short": Short}
+"""Methods that only these tests know; see `toy_methods`."""
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,6 @@ from facesynth.face.draw.video import read_video
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
-from facesynth.methods.capabilities import Capabilities
-from facesynth.methods.registry import register
 
 FILES = (
     "table.csv table.md table.tex utterances.csv comparisons.csv phones.csv emotions.csv points.csv trade.csv residuals.csv "
@@ -34,7 +32,6 @@ FAMILY = Family("By minutes", ("phone mean", "little"), "minutes", (9.0, 0.05))
 CURVE = Family("By what it holds", ("mean face", "wrong"), curve="still faces")
 
 
-@register(Capabilities("wrong_face"))
 class WrongFace(MeanFace):
     """A face that is held wrongly and shakes."""
 
@@ -44,7 +41,6 @@ class WrongFace(MeanFace):
         return Motion(motion.frames + shaking, motion.fps, motion.layout)
 
 
-@register(Capabilities("knowing"))
 class Knowing(MeanFace):
     """A method that tells what it learned."""
 
@@ -52,6 +48,10 @@ class Knowing(MeanFace):
         super().fit(corpus, seed=seed)
         self.facts["learned"] = {"temperature": 0.25}
         return self
+
+
+TOYS = {"wrong_face": WrongFace, "knowing": Knowing}
+"""Methods that only these tests know; see `toy_methods`."""
 
 
 METHODS = (
