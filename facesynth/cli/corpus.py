@@ -149,7 +149,8 @@ def add(
     """Add recordings to the corpus in FOLDER.
 
     FILES are files or folders. A recording is a video, whose face is captured; or a sound (or a video with sound) and a
-    motion file (.npz, .csv, .c3d, .mat, Live Link Face) of the same name, or one that holds the sound itself. Beside them
+    motion file (.npz, .csv, .c3d, .mat, BEAT's .json, Live Link Face, OpenFace) of the same name, or one that holds the
+    sound itself. Beside them
     may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd: lines of `start end word`), NAME.emotions.csv, and a CSV
     with the columns id and text for all of them. A FOLDER that is no corpus becomes one that fits the recordings.
     Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated; added

@@ -105,7 +105,7 @@ def read_take(path: Path, fps: float | None = None) -> Take:
     columns = [k for k, name in enumerate(names) if name not in (TIMECODE, COUNT)]
     values = _numbers(path, rows, columns)
     named = tuple(names[k] for k in columns)
-    values, said = _as_shares(path, values, [name not in ANGLES for name in named])
+    values, said = as_shares(path, values, [name not in ANGLES for name in named])
     times_s, counted = _times(path, timecodes, fps)
     frames, rate = _placed(path, timecodes, times_s, counted, fps)
     remarks += said + _lost_and_doubled(frames, values)
@@ -160,7 +160,7 @@ def _numbers(path: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     return values
 
 
-def _as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floats, list[str]]:
+def as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floats, list[str]]:
     """Values whose weights are shares of 1, and what was done."""
     weights = values[:, are_weights]
     highest = float(weights.max(initial=0.0))

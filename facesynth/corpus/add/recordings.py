@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.corpus.add.transcripts import is_table
+from facesynth.corpus.importers.beat import is_beat
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.livelink import is_live_link
 from facesynth.speech.textgrid import is_silence_mark
@@ -16,7 +17,7 @@ AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".a
 VIDEO = frozenset(
     {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".flv", ".3gp", ".wmv", ".ogv"}
 )
-MOTION = frozenset({".npz", ".csv", ".c3d", ".mat"})
+MOTION = frozenset({".npz", ".csv", ".c3d", ".mat", ".json"})
 OWN_SOUND = frozenset({".c3d", ".mat"})
 """Motion files that may hold the sound as well."""
 PHONES = frozenset({".textgrid", ".lab", ".phn"})
@@ -104,7 +105,7 @@ def _name_and_kind(file: Path) -> tuple[str, str | None]:
     name = unicodedata.normalize("NFC", file.name)
     for kind, suffixes in reversed(KINDS.items()):
         for suffix in suffixes:
-            if name.lower().endswith(suffix):
+            if name.lower().endswith(suffix) and (suffix != ".json" or is_beat(file)):
                 return name[: -len(suffix)], kind
     return name, None
 

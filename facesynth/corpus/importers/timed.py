@@ -1,0 +1,34 @@
+"""Frames that carry their own times, at a steady rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.inference.errors import FacesynthError
+from facesynth.motion.gaps import LONGEST_S
+from facesynth.motion.irregular import ROUNDING_S, USUAL_FPS, read_at, steady_rate
+
+Floats = NDArray[np.float64]
+
+
+def at_steady_rate(path: Path, signal: Floats, times_s: Floats) -> tuple[NDArray[np.float32], float, tuple[str, ...]]:
+    """A signal [T, C] with frames at `times_s` [T] from its first time on, its rate, and what was noticed.
+
+    FacesynthError where times go back. Frames that were lost leave gaps where they are longer than what is filled.
+    """
+    steps = np.diff(times_s)
+    if len(times_s) < 2 or not np.isfinite(times_s).all() or (steps <= 0).any():
+        row = int(np.argmax(~(steps > 0))) + 2 if len(steps) else 1
+        raise FacesynthError(f"{path}: the time of frame {row} does not lie after the one before; cut the file there")
+    fps, even = steady_rate(times_s, float(1 / np.median(steps)))
+    since_s = times_s - times_s[0]
+    usual = min(USUAL_FPS, key=lambda rate: abs(rate - fps))
+    fps = usual if np.abs(since_s * usual - np.rint(since_s * usual)).max() <= ROUNDING_S * usual else fps
+    if even:
+        return signal.astype(np.float32), fps, ()
+    regular_s = np.arange(int((since_s[-1] + ROUNDING_S) * fps) + 1) / fps
+    said = f"frames do not come at a steady rate: they were interpolated at their own times, at {fps:g} fps"
+    return read_at(signal, since_s, regular_s, LONGEST_S, ROUNDING_S), fps, (said,)

@@ -1,0 +1,121 @@
+"""Weights as BEAT keeps them, and what OpenFace writes: read by name, with what is missing told."""
+
+import json
+
+import bringing
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from facesynth.corpus.importers.formats import read
+from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
+
+COUNT, FPS = 120, 60
+
+
+def beat(path, names=ARKIT_NAMES[:-1], scale=1.0, times_s=None):
+    weights = np.random.default_rng(0).random((COUNT, len(names)))
+    times_s = np.arange(COUNT) / FPS if times_s is None else times_s
+    frames = [
+        {"weights": (scale * row).tolist(), "time": time, "rotation": []} for row, time in zip(weights, times_s, strict=True)
+    ]
+    path.write_text(json.dumps({"names": list(names), "frames": frames}), encoding="utf-8")
+    return weights
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_beat_is_read_by_name_and_what_is_missing_is_0(tmp_path, seed):
+    names = list(np.random.default_rng(seed).permutation(ARKIT_NAMES[:-1]))
+    weights = beat(tmp_path / "a.json", names)
+    reading = read(tmp_path / "a.json")
+    assert reading.motion.fps == FPS
+    own = reading.motion.layout.names
+    np.testing.assert_allclose(reading.motion.frames[:, [own.index(name) for name in names]], weights, atol=1e-6)
+    assert not reading.motion.frames[:, own.index("tongueOut")].any()
+    assert "1 of ARKit's 52 shapes are not in it and stay 0: tongueOut" in reading.remarks[0]
+
+
+def test_beat_in_per_cent_with_lost_frames_and_damage(tmp_path):
+    weights = beat(tmp_path / "a.json", scale=100)
+    reading = read(tmp_path / "a.json")
+    assert "per cent" in reading.remarks[0]
+    np.testing.assert_allclose(reading.motion.frames[:, :51], weights, atol=1e-6)
+    times_s = np.arange(COUNT) / FPS
+    times_s[60:] += 0.5
+    beat(tmp_path / "b.json", times_s=times_s)
+    gapped = read(tmp_path / "b.json").motion
+    assert np.array_equal(np.flatnonzero(np.isnan(gapped.frames[:, 0])), np.arange(60, 90))
+    for damage in (
+        '{"frames": [{"weights": [1]}]}',
+        '{"names": ["a"], "frames": []}',
+        '{"names": 3, "frames": 4, "weights"',
+        "[]",
+    ):
+        (tmp_path / "c.json").write_text(damage, encoding="utf-8")
+        with pytest.raises(FacesynthError):
+            read(tmp_path / "c.json")
+
+
+def test_beat_in_a_corpus_with_a_longer_sound(tmp_path):
+    beat(tmp_path / "take.json")
+    (tmp_path / "meta.json").write_text('{"camera": 1}', encoding="utf-8")
+    bringing.save_wav(tmp_path / "take.wav", bringing.hum(2.5), bringing.RATE)
+    (tmp_path / "take.lab").write_text("0.5 pau\n1.3 aa\n2.5 pau\n", encoding="utf-8")
+    report, account = bringing.added(tmp_path / "c", tmp_path / "take.json", tmp_path / "take.wav", tmp_path / "take.lab")
+    assert report["added"] == ["take"], report
+    assert "the motion lasts 2.00 s, the sound 2.50 s" in account
+    assert "tongueOut" in account
+
+
+def openface(path, faces=1, flat=False):
+    """A head that turns, with a face whose mouth opens; returns the face [T, 68, 3] in our axes and the head [T, 6]."""
+    rng = np.random.default_rng(0)
+    rest = rng.normal(0, 40, (68, 3))
+    face = rest + np.sin(np.arange(COUNT) / 9)[:, None, None] * rng.normal(0, 2, (68, 3))
+    turn = Rotation.from_euler("XYZ", np.stack([0.1 * np.sin(np.arange(COUNT) / 20 + k) for k in range(3)], axis=1))
+    shift = np.array([10.0, -20.0, 600.0]) + rng.normal(0, 1, (COUNT, 3))
+    camera = np.einsum("tij,tkj->tki", turn.as_matrix(), face * [1, -1, -1]) + shift[:, None]
+    names = ["frame", " face_id", " timestamp", " confidence", " success", " gaze_angle_x", " gaze_angle_y"]
+    names += [f" pose_{what}{axis}" for what in "TR" for axis in "xyz"]
+    names += [f" {axis}_{k}" for axis in ("xy" if flat else "XYZ") for k in range(68)] + [" AU45_r"]
+    rows = [",".join(names)]
+    for t in range(COUNT):
+        for who in range(faces):
+            success = int(not 30 <= t < 40) if who == 0 else int(t < 20)
+            cells = [t + 1, who, t / 30, 0.9, success, 0.1, 0.2, *shift[t], *turn[t].as_euler("XYZ")]
+            rows.append(",".join(f"{v:.6f}" for v in [*cells, *camera[t, :, : 2 if flat else 3].T.ravel(), 1.0]))
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return face
+
+
+def test_openface_gives_landmarks_head_and_gaze(tmp_path):
+    face = openface(tmp_path / "a.csv")
+    reading = read(tmp_path / "a.csv")
+    motion, seen = reading.motion, np.r_[0:30, 40:COUNT]
+    assert motion.fps == 30
+    np.testing.assert_allclose(motion.points[seen], face[seen], atol=0.01)
+    for part in (motion.frames, motion.head, motion.eyes):
+        assert np.array_equal(np.flatnonzero(np.isnan(part).all(axis=1)), np.arange(30, 40))
+    np.testing.assert_allclose(motion.eyes[0], [0.8, 0.1, -0.2], atol=1e-6)
+    np.testing.assert_allclose(motion.head[seen, 5], -600, atol=10)
+    assert "no success in 10 of 120 pictures" in reading.remarks[0]
+    assert read(tmp_path / "a.csv").motion.layout.lip_pairs
+
+
+def test_openface_with_two_faces_and_in_2d(tmp_path):
+    openface(tmp_path / "a.csv", faces=2)
+    reading = read(tmp_path / "a.csv")
+    assert len(reading.motion) == COUNT
+    assert "2 faces are in it: face_id 0" in reading.remarks[0]
+    openface(tmp_path / "b.csv", flat=True)
+    assert read(tmp_path / "b.csv").motion.layout.kind == "landmarks"
+
+
+def test_openface_in_a_corpus(tmp_path):
+    openface(tmp_path / "take.csv")
+    bringing.save_wav(tmp_path / "take.wav", bringing.hum(4.0), bringing.RATE)
+    (tmp_path / "take.lab").write_text("0.5 pau\n1.3 aa\n4.0 pau\n", encoding="utf-8")
+    report, account = bringing.added(tmp_path / "c", tmp_path / "take.csv", tmp_path / "take.wav", tmp_path / "take.lab")
+    assert report["added"] == ["take"], report
+    assert "no success in 10 of 120 pictures" in account
