@@ -1,0 +1,42 @@
+"""The largest time between a click that is heard and the closure that is seen with it, in every container.
+
+python benchmarks/containers.py
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "reports"))
+
+from closing_clips import CONTAINERS, Clip, at_30_fps, largest_error_s, write
+
+CLIPS = {
+    "steady": Clip(),
+    "gap of 0.8 s in the sound": Clip((0.35, 1.6, 2.1), 2.6, at_30_fps(2.6), moved=((0.5, 0.8),)),
+    "sound begins 0.5 s late": Clip((0.7, 1.2, 1.6), 2.4, at_30_fps(2.0), moved=((-1.0, 0.5),)),
+    "overlaps": Clip((0.4, 1.4, 1.8), 2.2, at_30_fps(2.1), overlapping=9),
+    "15, then 30 fps": Clip((0.4, 0.8, 1.7, 2.5), 3.0, (*(k / 15 for k in range(15)), *(1 + k / 30 for k in range(60)))),
+}
+"""AVI has no time stamps of its own: only the steady clip can be written to it."""
+
+
+def main() -> None:
+    print("| container | codecs | " + " | ".join(CLIPS) + " |")
+    print("|---|---|" + "---|" * len(CLIPS))
+    with tempfile.TemporaryDirectory() as folder:
+        for suffix, codecs in CONTAINERS.items():
+            cells = []
+            for name, clip in CLIPS.items():
+                if suffix == "avi" and name != "steady":
+                    cells.append("")
+                    continue
+                path = write(Path(folder) / f"clip.{suffix}", clip)
+                cells.append(f"{1000 * largest_error_s(path, clip):.1f}")
+            print(f"| {suffix} | {' + '.join(codecs)} | " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    main()
