@@ -56,4 +56,4 @@ def export_only(method: str) -> None:
     """What the scripts under export/ run: the same for models of one method."""
     from facesynth.cli import run
 
-    run(export, [*([method] if method in ("features", "face") else []), *sys.argv[1:]], method)
+    run(export, [*([method] if method in ("features", "phones", "face") else []), *sys.argv[1:]], method)

@@ -14,7 +14,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import RIDGE
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
-from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
@@ -31,21 +31,23 @@ HELD_OUT_SHARE = 0.2
 
 @register(RIDGE)
 class Ridge(Method):
-    """Linear regression from 40 log-mel bands at 21 times over ±200 ms to 25 principal components of the motion.
+    """Linear regression from 40 log-mel bands (or other features, see `Hearing`) to 25 principal components of the motion.
+
+    The sound is heard at 21 times over ±200 ms around a frame.
 
     The penalty is the one that predicts a fifth of the training sentences best from the others; the weights are then
     learned from all.
     """
 
     weights: Tensor
-    """[840, D]"""
+    """[21 W, D] of W features."""
     bias: Tensor
     """[D]"""
 
-    def __init__(self, components: int = 25) -> None:
+    def __init__(self, components: int = 25, features: Features = "log_mel") -> None:
         super().__init__()
         self.components = components
-        self.hearing = Hearing()
+        self.hearing = Hearing(features)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.register_buffer("weights", torch.zeros(0, 0))
         self.register_buffer("bias", torch.zeros(0))
@@ -74,12 +76,12 @@ class Ridge(Method):
         return Motion(frames.cpu().numpy(), self.fps, layout)
 
     def _heard(self, speech: Speech, count: int) -> Tensor:
-        """[T, 840] bands around each of `count` frames."""
+        """[T, 21 W] features around each of `count` frames."""
         return self.hearing.at(speech, (np.arange(count) / self.fps)[:, None] + OFFSETS_S).flatten(1)
 
     def _moments(self, corpus: Corpus, held_out: frozenset[str]) -> tuple[Moments, Moments]:
         """Sums over the sentences to learn from, and over those held out."""
-        inputs, outputs = self.hearing.mel.bands * len(OFFSETS_S), self.pca.basis.shape[1]
+        inputs, outputs = self.hearing.width * len(OFFSETS_S), self.pca.basis.shape[1]
         parts = Moments.zero(inputs, outputs), Moments.zero(inputs, outputs)
         for utterance in track(corpus, "ridge: listening", len(corpus)):
             present = complete(utterance.motion.frames)

@@ -15,7 +15,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import TCN
 from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
-from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
@@ -24,7 +24,8 @@ from facesynth.motion.pca import Pca
 
 @register(TCN)
 class Tcn(Method):
-    """Four 1-D convolutions, 128 wide, kernel 5, dilation up to 2, dropout 0.3, from log-mel bands to 25 components.
+    """Four 1-D convolutions, 128 wide, kernel 5, dilation up to 2, dropout 0.3, from log-mel bands (or other features, see
+    `Hearing`) to 25 components.
 
     AdamW on the squared error over random windows, the learning rate falling along a cosine. The same seed gives the
     same weights on the same machine with the same number of threads.
@@ -33,14 +34,14 @@ class Tcn(Method):
     scale: Tensor
     """[1] standard deviation of the first component, unit of the layout."""
 
-    def __init__(self, components: int = 25, steps: int = STEPS) -> None:
+    def __init__(self, components: int = 25, steps: int = STEPS, features: Features = "log_mel") -> None:
         super().__init__()
         if steps < 1:
             raise FacesynthError(f"tcn needs at least one step of training; got {steps}")
         self.components, self.steps = components, steps
-        self.hearing = Hearing()
+        self.hearing = Hearing(features)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
-        self.network = network(self.hearing.mel.bands, components, seed=0)
+        self.network = network(self.hearing.width, components, seed=0)
         self.register_buffer("scale", torch.ones(1))
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
@@ -51,7 +52,7 @@ class Tcn(Method):
         self.hearing.learn(corpus)
         self.scale = self.pca.encode(torch.from_numpy(frames).to(self.device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
         tracks = [self._tracks(utterance) for utterance in corpus]
-        self.network = network(self.hearing.mel.bands, self.pca.basis.shape[1], seed).to(self.device)
+        self.network = network(self.hearing.width, self.pca.basis.shape[1], seed).to(self.device)
         self.facts = {"loss": train(self.network, tracks, self.steps, seed, "tcn: learning")}
         return self.eval()
 
@@ -61,7 +62,7 @@ class Tcn(Method):
         refuse_options(self.name, options)
         layout = self.fitted_layout
         times_s = np.arange(int(np.ceil(speech.duration_s * RATE)) + 1) / RATE
-        heard = self.hearing.at(speech, times_s).T[None]  # [1, 40, F]
+        heard = self.hearing.at(speech, times_s).T[None]  # [1, W, F]
         coordinates = self.network(heard)[0].T * self.scale
         poses = self.pca.decode(coordinates).cpu().numpy().astype(np.float64)
         frames = spline_at(poses, np.arange(speech.phones.frame_bounds(self.fps)[-1]) / self.fps * RATE)

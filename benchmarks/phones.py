@@ -1,0 +1,217 @@
+"""How well phones are heard without a transcript: `python benchmarks/phones.py FOLDER [--clips N] [--few N]`.
+
+FOLDER holds any of `grid_s1`, `ravdess_speech` (words known: the reference is their alignment) and `haskins_ema` (phones
+labelled by hand). Phone error is Levenshtein distance over phones of the reference, viseme error the same over viseme classes
+with repeats merged; closures are p, b, m whose middles lie within 60 ms of each other, one to one. The real-time factor is
+processor time over the sound's length, on one thread.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import torch
+from alignment import STATEMENTS, edits, spoken
+from scipy.io import loadmat
+from scipy.optimize import linear_sum_assignment
+from torchaudio.functional import bandpass_biquad, phase_vocoder
+
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.phones import BILABIALS, viseme_of
+from facesynth.inference.speech import PhoneTrack
+from facesynth.speech.alignment import align
+from facesynth.speech.audio import load_audio, resample
+from facesynth.speech.decoder_recognition import recognise_by_decoder
+from facesynth.speech.phone_network import phone_hearing
+from facesynth.speech.recognition import recognise
+from facesynth.speech.segments import phone_track, segments_of
+
+NEAR_S = 0.06
+RATE = 16000
+T = TypeVar("T")
+Hear = Callable[[np.ndarray, int], PhoneTrack]
+
+
+@dataclass
+class Clip:
+    audio: np.ndarray
+    rate: int
+    truth: PhoneTrack
+
+
+@dataclass
+class Score:
+    """Sums over clips."""
+
+    phones: int = 0
+    wrong: int = 0
+    visemes: int = 0
+    wrong_visemes: int = 0
+    closures: int = 0
+    heard_closures: int = 0
+    met: int = 0
+    refused: int = 0
+    processor_s: float = 0.0
+    sound_s: float = 0.0
+
+    def add(self, clip: Clip, hear: Hear) -> None:
+        begun = time.process_time()
+        try:
+            heard = hear(clip.audio, clip.rate)
+        except FacesynthError:
+            self.refused += 1
+            return
+        self.processor_s += time.process_time() - begun
+        self.sound_s += len(clip.audio) / clip.rate
+        self.phones += len(spoken(clip.truth))
+        self.wrong += edits(spoken(heard), spoken(clip.truth))
+        self.visemes += len(visemes(clip.truth))
+        self.wrong_visemes += edits(visemes(heard), visemes(clip.truth))
+        wanted, got = closures(clip.truth), closures(heard)
+        self.closures, self.heard_closures = self.closures + len(wanted), self.heard_closures + len(got)
+        self.met += met(wanted, got)
+
+    def __str__(self) -> str:
+        per, ver = self.wrong / max(self.phones, 1), self.wrong_visemes / max(self.visemes, 1)
+        recall, precision = self.met / max(self.closures, 1), self.met / max(self.heard_closures, 1)
+        factor = self.processor_s / max(self.sound_s, 1e-9)
+        told = f"PER {per:.3f}  VER {ver:.3f}  closures {recall:.3f} / {precision:.3f} of {self.closures}  RTF {factor:.3f}"
+        return told + (f"  refused {self.refused}" if self.refused else "")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--clips", type=int, default=40, help="of each large set, taken evenly")
+    parser.add_argument("--few", type=int, default=10, help="of each large set: heard as streams, in noise and worse")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    sets = {name: list(found(options.folder / name, options.clips)) for name, found in SETS.items()}
+    ways: dict[str, Hear] = {
+        "pocketsphinx": recognise_by_decoder,
+        "network": partial(recognise, fit=False),
+        "network, fitted": recognise,
+    }
+    for name, clips in sets.items():
+        report(name, clips, ways)
+    few = [clip for name in ("grid_s1", "ravdess_speech") for clip in evenly(sets[name], options.few)]
+    report("streams", few, {f"look-ahead {ahead_s} s": partial(streamed, ahead_s=ahead_s) for ahead_s in (0.1, 0.2, 0.4, 0.8)})
+    for condition, change in conditions(few).items():
+        report(condition, list(map(change, few)), {"network": ways["network"]})
+
+
+def report(name: str, clips: list[Clip], ways: dict[str, Hear]) -> None:
+    print(f"\n{name}: {len(clips)} clips")
+    for way, hear in ways.items():
+        score = Score()
+        for clip in clips:
+            score.add(clip, hear)
+        print(f"  {way:20s} {score}", flush=True)
+
+
+def streamed(audio: np.ndarray, rate: int, ahead_s: float) -> PhoneTrack:
+    stream = phone_hearing().stream(look_ahead_s=ahead_s)
+    placed = [*stream.push(resample(audio, rate, RATE)), *stream.finish()]
+    labels, ends_s, confidences = zip(*placed, strict=True)
+    return PhoneTrack(labels, np.array(ends_s), np.array(confidences))
+
+
+def grid(folder: Path, count: int) -> Iterator[Clip]:
+    for film in evenly(sorted(folder.glob("*.mpg")), count):
+        words = [line.split()[2] for line in film.with_suffix(".align").read_text().splitlines()]
+        yield from aligned(film, " ".join(word for word in words if word not in ("sil", "sp")))
+
+
+def ravdess(folder: Path, count: int) -> Iterator[Clip]:
+    for path in evenly(sorted(folder.rglob("*.flac")), count):
+        yield from aligned(path, STATEMENTS[path.stem.split("-")[4]])
+
+
+def haskins(folder: Path, _count: int) -> Iterator[Clip]:
+    for path in sorted(folder.glob("*.mat")):
+        sound = next(v for k, v in loadmat(path, squeeze_me=True, struct_as_record=False).items() if not k.startswith("__"))[0]
+        audio = (sound.SIGNAL / np.abs(sound.SIGNAL).max() / 2).astype(np.float32)
+        yield Clip(audio, sound.SRATE, phone_track([(str(p.LABEL), *map(float, p.OFFS)) for p in sound.PHONES]))
+
+
+SETS = {"grid_s1": grid, "ravdess_speech": ravdess, "haskins_ema": haskins}
+
+
+def aligned(path: Path, text: str) -> Iterator[Clip]:
+    audio, rate = load_audio(path)
+    try:
+        yield Clip(audio, rate, align(audio, rate, text).phones)
+    except FacesynthError as error:
+        print(f"{path.name} is left out: {error}")
+
+
+def evenly(whole: list[T], count: int) -> list[T]:
+    return [whole[i * len(whole) // count] for i in range(min(count, len(whole)))]
+
+
+def conditions(clips: list[Clip]) -> dict[str, Callable[[Clip], Clip]]:
+    rng = np.random.default_rng(0)
+
+    def noisy(clip: Clip, decibel: float, noise: Callable[[int], np.ndarray]) -> Clip:
+        added = noise(len(clip.audio))
+        gain = np.sqrt(np.mean(clip.audio**2) / np.mean(added**2)) * 10 ** (-decibel / 20)
+        return Clip((clip.audio + gain * added).astype(np.float32), clip.rate, clip.truth)
+
+    def babble(length: int) -> np.ndarray:
+        others = [clips[i].audio for i in rng.choice(len(clips), 6)]
+        return np.sum([np.resize(audio / audio.std(), length) for audio in others], axis=0)
+
+    def telephone(clip: Clip) -> Clip:
+        heard = bandpass_biquad(torch.from_numpy(clip.audio), clip.rate, 1010.0, 1010 / 3100)
+        return Clip(resample(heard.numpy(), clip.rate, 8000), 8000, clip.truth)
+
+    white = partial(noisy, noise=rng.standard_normal)
+    return {
+        "clean": lambda clip: clip,
+        **{f"white noise, {level} dB": partial(white, decibel=level) for level in (20, 10, 5)},
+        **{f"babble of six, {level} dB": partial(noisy, decibel=level, noise=babble) for level in (20, 10, 5)},
+        "telephone band": telephone,
+        "a quarter faster": partial(paced, factor=1.25),
+        "a quarter slower": partial(paced, factor=0.8),
+        "pitch and formants a quarter higher": lambda clip: moved(paced(clip, 0.8), 1.25),
+    }
+
+
+def paced(clip: Clip, factor: float) -> Clip:
+    """Said faster, pitch kept."""
+    window = torch.hann_window(1024)
+    spectrum = torch.stft(torch.from_numpy(clip.audio), 1024, 256, window=window, return_complex=True)
+    advance = torch.linspace(0, np.pi * 256, 513)[:, None]
+    sound = torch.istft(phase_vocoder(spectrum, factor, advance), 1024, 256, window=window).numpy()
+    return Clip(sound, clip.rate, PhoneTrack(clip.truth.labels, clip.truth.ends_s / factor))
+
+
+def moved(clip: Clip, factor: float) -> Clip:
+    """Played faster: everything higher."""
+    return Clip(clip.audio, round(clip.rate * factor), PhoneTrack(clip.truth.labels, clip.truth.ends_s / factor))
+
+
+def visemes(track: PhoneTrack) -> list[int]:
+    return [viseme for viseme, _ in groupby(map(viseme_of, spoken(track)))]
+
+
+def closures(track: PhoneTrack) -> np.ndarray:
+    return np.array([(start_s + end_s) / 2 for label, start_s, end_s in segments_of(track) if label in BILABIALS])
+
+
+def met(wanted: np.ndarray, got: np.ndarray) -> int:
+    """How many pairs lie near each other, at most."""
+    near = np.abs(wanted[:, None] - got) <= NEAR_S
+    return int(near[linear_sum_assignment(near, maximize=True)].sum())
+
+
+if __name__ == "__main__":
+    main()
