@@ -3,6 +3,7 @@
 import numpy as np
 from corpora import tiny_layout
 
+from facesynth.corpus import Corpus
 from facesynth.inference.eyes import at_rest
 from facesynth.inference.motion import Motion
 from facesynth.methods.eyes.method import Eyes
@@ -28,3 +29,15 @@ def learnt(*motions, **config):
     model.layout, model.emotions = tiny_layout(), ("neutral",)
     model.learn(motions, "the test")
     return model.eval()
+
+
+def with_eyes(corpus, opening=None):
+    """The corpus with eyes in every recording."""
+    for number, record in enumerate(corpus.records):
+        path = corpus.files.motion(record.id)
+        arrays = dict(np.load(path))
+        own = recording(len(arrays["frames"]) / corpus.fps, seed=number, fps=corpus.fps, every_s=0.5)
+        eyes = own.eyes[: len(arrays["frames"])].copy()
+        eyes[:, 0] = eyes[:, 0] if opening is None else opening
+        np.savez(path, **(arrays | {"eyes": eyes, "head": own.head[: len(eyes)]}))
+    return Corpus.open(corpus.path)

@@ -3,8 +3,10 @@ import io
 
 import pytest
 from corpora import tiny_corpus
+from living_eyes import with_eyes
 
 from facesynth.evaluation.papers import Material, reproduce
+from facesynth.evaluation.papers.deng2006_eyes import eyes
 from facesynth.evaluation.papers.deng2006_speech import DEGREES, coarticulation, eigenspace
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
 from facesynth.evaluation.papers.joined import joined, phones_until
@@ -87,6 +89,19 @@ def test_the_dissertations_speech_is_measured_and_drawn(corpus):
     assert 0 < float(space.ours.rstrip("%")) <= 100
     neutral = corpus.subset(r.id for r in corpus.records if r.emotion == "neutral")
     assert "in neutral alone" in eigenspace(Material(neutral, neutral, neutral, 0)).why
+
+
+def test_the_dissertations_eyes_are_measured_and_drawn(tmp_path):
+    corpus = with_eyes(tiny_corpus(tmp_path / "eyes", utterances=12, fps=60))
+    covered, bend, stuck, ratings = eyes(Material(corpus, corpus, corpus, 0))
+    assert (covered.where, bend.where, stuck.where, ratings.where) == ("fig. 3.6", "§3.4", "§3.3", "fig. 3.8")
+    assert covered.figure.startswith("data:image/")
+    assert 0 <= float(covered.ours.rstrip("%")) <= float(bend.ours.split()[-1].rstrip("%")) <= 100
+    assert ratings.status == "not available"
+    few = corpus.subset(corpus.ids[:1])
+    refused = eyes(Material(few, few, few, 0))[0]
+    assert refused.status == "not available"
+    assert "at least 10 s" in refused.why
 
 
 def test_a_page_shows_every_figure_and_its_picture_and_files_hold_no_pictures():

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout, tiny_utterances
-from living_eyes import FPS, learnt, recording
+from living_eyes import FPS, learnt, recording, with_eyes
 
-from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.eyes import at_rest
 from facesynth.inference.gaze import REACH_RAD
@@ -140,15 +139,3 @@ def test_what_teaches_nothing_is_refused_in_a_line(tmp_path):
     for wrong in ({"patch_s": "long"}, {"boundary": 1.0}, {"tolerance": -1.0}, {"compensation": True}):
         with pytest.raises(FacesynthError, match=next(iter(wrong))):
             Eyes(**wrong)
-
-
-def with_eyes(corpus, opening=None):
-    """The corpus with eyes in every recording."""
-    for number, record in enumerate(corpus.records):
-        path = corpus.files.motion(record.id)
-        arrays = dict(np.load(path))
-        own = recording(len(arrays["frames"]) / corpus.fps, seed=number, fps=corpus.fps, every_s=0.5)
-        eyes = own.eyes[: len(arrays["frames"])].copy()
-        eyes[:, 0] = eyes[:, 0] if opening is None else opening
-        np.savez(path, **(arrays | {"eyes": eyes, "head": own.head[: len(eyes)]}))
-    return Corpus.open(corpus.path)
