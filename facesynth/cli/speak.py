@@ -55,6 +55,13 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--fps", type=Fps(), show_default="30", help="Frame rate of what is written.")
 @click.option("--head", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")
 @click.option("--eyes", type=PartType(), default="1", show_default=True, help="off, recorded alone, a factor, or a model.")
+@click.option(
+    "--mouth",
+    type=click.FloatRange(min=0),
+    default=1.0,
+    show_default=True,
+    help="Factor on the movement of mouth and jaw; lips that are shut stay shut.",
+)
 @click.option("--size", type=Size(), show_default="1280x720", help="Of the video.")
 @click.option(
     "--rig",

@@ -78,7 +78,8 @@ class PictureStage:
         """The speaker of a model; what was asked for that the pictures decide is warned of."""
         idle = [f"--{name}" for name in ("fps", "size") if getattr(request, name) is not None]
         idle += [f"--{name}" for name in ("head", "eyes") if getattr(request, name) != Part()]
-        warning = f"{', '.join(idle)}: a real face keeps the rate, size, head and eyes of its pictures"
+        idle += ["--mouth"] if request.mouth != 1 else []
+        warning = f"{', '.join(idle)}: a real face keeps the rate, size, mouth, head and eyes of its pictures"
         return cls(load_face(mouth), request, (warning,) if idle else ())
 
     def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Likeness:

@@ -120,7 +120,13 @@ class HeadStage:
         asked = self.request
         face = whole_face(cast, self._as_arkit(motion), speech, asked)
         animation = animate(
-            face.motion, self.rig, eyes_gain=asked.eyes.factor, seed=asked.seed, phones=speech.phones, eyes=face.eyes
+            face.motion,
+            self.rig,
+            eyes_gain=asked.eyes.factor,
+            mouth_gain=asked.mouth,
+            seed=asked.seed,
+            phones=speech.phones,
+            eyes=face.eyes,
         ).resampled(float(asked.fps or FPS))
         animation = replace(animation, sources=face.sources)
         skin = self._skin(face.motion, animation)

@@ -95,6 +95,8 @@ class Request:
     """Where to write why each phone got its motion, as JSON."""
     head: Part = Part()
     eyes: Part = Part()
+    mouth: float = 1.0
+    """Factor on the movement of mouth and jaw; lips that are shut stay shut."""
     fps: Fraction | float | None = None
     """Of what is written, Hz; 30 on a head, that of the pictures of a real face."""
     size: tuple[int, int] | None = None
@@ -128,6 +130,7 @@ class Request:
         for name, choices in (("deform", DEFORMS), ("pictures", PICTURES)):
             if getattr(self, name) not in choices:
                 raise unknown(name, getattr(self, name), choices)
+        _check_mouth(self.mouth, self.deform)
         if self.fps is not None and not RATES_HZ[0] <= self.fps <= RATES_HZ[1]:
             raise FacesynthError(f"a rate from {RATES_HZ[0]} to {RATES_HZ[1]} Hz is wanted; got {self.fps}")
         if self.size is not None:
@@ -144,6 +147,13 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+def _check_mouth(gain: float, deform: Deform) -> None:
+    if not 0 <= gain < float("inf"):
+        raise FacesynthError(f"--mouth is a factor of 0 or above, such as 1.3; got {gain}")
+    if gain != 1 and deform != "shapes":
+        raise FacesynthError(f"--mouth works on the solved shapes, which --deform {deform} does not show; leave one out")
 
 
 def _check_size(size: tuple[int, int]) -> None:

@@ -146,7 +146,7 @@ def test_names_of_arkit_in_disguise(name, meant):
 
 
 def test_a_head_with_all_of_arkit_needs_no_preset():
-    from facesynth.face.rig.arkit import ARKIT_NAMES
+    from facesynth.motion.arkit_names import ARKIT_NAMES
 
     assert fitting((*ARKIT_NAMES, "viseme_aa", "viseme_O", "viseme_U", "mouthOpen")) == ("", {})
     assert fitting(("one", "two", "three", "four")) == ("", {})

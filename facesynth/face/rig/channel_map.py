@@ -112,7 +112,10 @@ def on_channels(animation: FaceAnimation, channel_map: ChannelMap) -> FaceAnimat
     if not set(animation.names) & set(ARKIT_NAMES):
         odd = ", ".join(animation.names[:3])
         raise FacesynthError(f"the curves {odd} … are neither this head's nor ARKit's; give a mapping file (--mapping)")
-    values = channel_map.own(animation.weights_for(ARKIT_NAMES))
+    weights = animation.weights_for(ARKIT_NAMES)
+    jaw, close = (ARKIT_NAMES.index(name) for name in ("jawOpen", "mouthClose"))
+    weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])  # it undoes the jaw at the lips, and nothing else
+    values = channel_map.own(weights)
     return replace(animation, names=names, weights=values, ranges=channel_map.ranges)
 
 

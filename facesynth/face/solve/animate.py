@@ -14,6 +14,7 @@ from facesynth.face.rig.markers import LipGap, marker_vertices
 from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
 from facesynth.face.solve.closures import with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
+from facesynth.face.solve.mouth import amplified, close_within_jaw
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
@@ -30,6 +31,7 @@ def animate(
     *,
     head_gain: float = 1.0,
     eyes_gain: float = 1.0,
+    mouth_gain: float = 1.0,
     seed: int = 0,
     phones: PhoneTrack | None = None,
     eyes: EyeMotion = quiet_eyes,
@@ -45,6 +47,7 @@ def animate(
     ----------
     head_gain : factor on the head's turns and shifts; 0 keeps it still
     eyes_gain : factor on the gaze; 0 keeps the eyes open and straight
+    mouth_gain : factor on the movement of mouth and jaw; lips that are shut stay shut
     """
     for name, gain in (("head_gain", head_gain), ("eyes_gain", eyes_gain)):
         if not (np.isfinite(gain) and gain >= 0):
@@ -54,9 +57,15 @@ def animate(
     made = eyes(head, motion.fps, phones, seed)
     gaze = _gaze(motion, made) * eyes_gain
     if motion.layout.kind == "curves" and not arkit_columns(motion.layout):
+        if mouth_gain != 1:
+            odd = ", ".join(motion.layout.names[:3])
+            raise FacesynthError(
+                f"the curves {odd} … are not ARKit's, so nobody knows the mouth; give a mapping file (--mapping)"
+            )
         values = np.clip(motion.frames, 0, 1)
         return FaceAnimation(motion.layout.names, values, head, gaze, np.zeros(len(motion)), motion.fps)
     weights, residual = _weights(motion, rig, phones)
+    weights = amplified(weights, mouth_gain, LipGap.of(rig)) if mouth_gain != 1 else weights
     shut = _lids(motion, weights, made) if eyes_gain else np.zeros(len(motion))
     _set_lids(weights, shut, awake=eyes_gain == 0)
     weights = gaze_weights(weights, gaze)
@@ -89,7 +98,7 @@ def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArr
     weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
     lips = LipGap.of(rig)
     met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
-    return with_lips_apart(met, lips), residual
+    return close_within_jaw(with_lips_apart(met, lips), lips), residual
 
 
 def _curves(motion: Motion) -> NDArray[np.float64]:
