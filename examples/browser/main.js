@@ -4,7 +4,9 @@ import { Head } from "./head.js";
 import { openFolder, readWav, run, speak } from "./model.js";
 
 ort.env.wasm.wasmPaths = new URL("./ort/", import.meta.url).href;
-ort.env.wasm.numThreads = 1;
+// Threads share memory, which a page may do only where its server isolates it from others (COOP and COEP headers).
+const threads = globalThis.crossOriginIsolated ? Math.min(4, navigator.hardwareConcurrency || 1) : 1;
+ort.env.wasm.numThreads = threads;
 
 const said = document.getElementById("said");
 const read = (folder) => async (name) => {
@@ -31,7 +33,8 @@ async function main() {
   };
   await show(widest(frames, count, channels, lds.manifest.layout.lip_pairs));
   const seconds = audio.length / lds.manifest.sample_rate;
-  said.textContent = `${count} frames for ${seconds.toFixed(2)} s of speech in ${(spoken - ready).toFixed(0)} ms`;
+  said.textContent = `${count} frames for ${seconds.toFixed(2)} s of speech in ${(spoken - ready).toFixed(0)} ms`
+    + ` on ${threads} thread${threads === 1 ? "" : "s"}${globalThis.crossOriginIsolated ? "" : " (the page is not cross-origin isolated)"}`;
   report({ count, channels, frames: Array.from(frames), start_ms: ready - began, speak_ms: spoken - ready, seconds });
   playable(lds, show, count);
 }

@@ -11,7 +11,11 @@ export async function openFolder(read, ort) {
     if (!wanted) throw new Error(`${entry.file} is not listed in the manifest`);
     const content = await read(entry.file);
     if ((await sha256(content)) !== wanted.sha256) throw new Error(`${entry.file} does not have the hash that the manifest states`);
-    graphs[name] = { entry, session: await ort.InferenceSession.create(content) };
+    try {
+      graphs[name] = { entry, session: await ort.InferenceSession.create(content) };
+    } catch (error) {
+      throw new Error(`${entry.file} is no graph that onnxruntime runs (${error.message ?? error}); export the model again`);
+    }
   }
   return { manifest, graphs };
 }
