@@ -1,0 +1,66 @@
+"""Train eyes on a corpus, compare what they grow with recordings left out, save the model.
+
+python train/eyes.py CORPUS [--lids CORPUS] [-o eyes.safetensors] [--config configs/eyes.yaml] [patch_s=0.5 …]
+
+--lids names a corpus that lends its lids, where the eyes of CORPUS were recorded without.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facesynth.config import load_config, parse_settings
+from facesynth.corpus import Corpus
+from facesynth.corpus.eyes import recorded_eyes
+from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixation_statistics, pooled
+from facesynth.inference.eyes import Floats
+from facesynth.methods.eyes.method import Eyes
+from facesynth.methods.eyes.recordings import eyes_of, opening_of, whole_pieces
+
+LEAST_S = 1.0
+"""Of a recording that is compared with."""
+
+
+def measured(opening: Floats, eyes: NDArray[np.floating], fps: float) -> Samples:
+    """Of lids [T, 1] and the gaze of eyes [T, 3]."""
+    return {**fixation_statistics(eyes[:, 1:].astype(np.float64), fps), **blink_statistics(opening[:, 0], fps)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
+    parser.add_argument("--lids", type=Path)
+    parser.add_argument("-o", "--output", type=Path, default=Path("eyes.safetensors"))
+    parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "eyes.yaml")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_intermixed_args()
+
+    # load
+    recorded, held_out = Corpus.open(options.corpus).split(options.seed)
+    lids = Corpus.open(options.lids) if options.lids else None
+    settings = {**load_config(options.config), **parse_settings(options.settings)}
+
+    # fit
+    model = Eyes.from_config(settings).fit(recorded, seed=options.seed, lids=lids)
+    print(", ".join(f"{name} {value}" for name, value in model.facts.items()))
+
+    # evaluate: Kolmogorov-Smirnov distances, for heads that move as those of the recordings do
+    own, made = [], []
+    pieces = [piece for motion, _ in recorded_eyes(held_out) for piece in whole_pieces(motion, LEAST_S)]
+    for number, piece in enumerate(pieces):
+        grown = eyes_of(model.look(piece, seed=options.seed + number))
+        own.append(measured(opening_of(piece, model.facts["shut_level"]), eyes_of(piece), piece.fps))
+        made.append(measured(grown[:, :1].astype(np.float64), grown, piece.fps))
+    for name, apart in distances(pooled(made), pooled(own)).items() if own else ():
+        print(f"{name}: {apart:.2f} apart")
+
+    # save
+    model.save(options.output)
+    print(f"saved {options.output}")
+
+
+if __name__ == "__main__":
+    main()
