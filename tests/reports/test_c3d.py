@@ -51,6 +51,22 @@ def test_numbers_that_stand_for_gaps_are_gaps(tmp_path, filler, whole):
     assert any("are gaps" in remark for remark in reading.remarks)
 
 
+@pytest.mark.parametrize("filler", [-16512.0, 9999.999, 0.0])
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+def test_tables_write_them_too(tmp_path, filler, suffix):
+    points = face()
+    points[20:40, 2] = filler
+    path = tmp_path / f"a.{suffix}"
+    if suffix == "npz":
+        np.savez(path, frames=points, names=np.array(NAMES), fps=120.0)
+    else:
+        header = ",".join(f"{name}.{axis}" for name in NAMES for axis in "xyz")
+        np.savetxt(path, points.reshape(300, -1), delimiter=",", header=header, comments="", fmt="%.6f")
+    reading = read(path, fps=120)
+    assert np.array_equal(np.flatnonzero(np.isnan(reading.motion.points[:, 2, 0])), np.arange(20, 40))
+    assert "they are gaps" in reading.remarks[-1]
+
+
 def test_a_face_that_walks_through_the_room_has_no_gaps(tmp_path):
     points = face(600) + np.linspace(0, 4000, 600)[:, None, None] * np.array([1, 0, 0.5])
     assert np.isfinite(read(write_c3d(tmp_path / "a.c3d", points, labels=NAMES)).motion.frames).all()

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus.importers.description import UNITS_MM, Written, unit_mm
-from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, require_file
+from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, open_gaps, require_file
 from facesynth.corpus.motion_files import shortened
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
-from facesynth.motion.gaps import filled_in
 
 SOUNDS = ("audio", "sound", "mic", "voice", "speech")
 """What analog channels that hold sound are called."""
@@ -49,8 +48,9 @@ def read_c3d(path: Path, layout: Layout | None = None, written: Written | None =
             f"{path} is in {content.unit!r}; known units are {', '.join(UNITS_MM)}; say the right one in a layout file:"
             " `files: {unit: …}`"
         )
-    unseen = filled_in(content.points) & ~np.isnan(content.points).any(axis=2)
-    placed = written.placed(np.where(unseen[..., None], np.nan, content.points), unit)
+    are_markers = np.array([label not in outputs for label in labels], bool)
+    content.points[:, are_markers], gaps = open_gaps(content.points[:, are_markers])
+    placed = written.placed(content.points, unit)
     names = _named(path, labels, outputs) if layout is None else layout.names
     for name in names:
         if name not in labels:
@@ -58,8 +58,7 @@ def read_c3d(path: Path, layout: Layout | None = None, written: Written | None =
     places = [labels.index(name) for name in names]
     frames = placed[:, places]
     remarks = [*content.remarks, *_left_out(labels, names, outputs)]
-    if count := np.count_nonzero(unseen[:, places]):
-        remarks.append(f"{count} samples stand far from the face, as programs write gaps: they are gaps")
+    remarks += gaps
     remarks += _size(frames, written.unit or unit)
     motion = motion_of_arrays(path, frames.reshape(len(placed), -1), content.fps, layout or Layout("markers", names))
     return Reading(motion, _sound(content), remarks=tuple(remarks))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from facesynth.corpus.importers.articulography import is_articulography, read_articulography
@@ -11,7 +12,7 @@ from facesynth.corpus.importers.description import Written, description_beside
 from facesynth.corpus.importers.flame import is_flame, read_flame
 from facesynth.corpus.importers.livelink import read_livelink_motion
 from facesynth.corpus.importers.openface import is_openface, read_openface
-from facesynth.corpus.importers.reading import Reading, require_file
+from facesynth.corpus.importers.reading import Reading, motion_of_arrays, open_gaps, require_file
 from facesynth.corpus.importers.tables import load_mat, read_numbers, read_table
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
@@ -46,7 +47,18 @@ def read(
         written = (written or Written()).over(beside.written)
     if suffix == ".c3d":
         return read_c3d(path, layout, written)
-    return read_table(path, layout, fps, written, otherwise=otherwise)
+    return _with_gaps(path, read_table(path, layout, fps, written, otherwise=otherwise))
+
+
+def _with_gaps(path: Path, reading: Reading) -> Reading:
+    """A table's markers with gaps where it holds numbers for them."""
+    motion = reading.motion
+    if motion.layout.kind != "markers":
+        return reading
+    points, said = open_gaps(motion.points)
+    frames = points.reshape(motion.frames.shape)
+    opened = motion_of_arrays(path, frames, motion.fps, motion.layout, motion.head, motion.eyes)
+    return replace(reading, motion=opened, remarks=(*reading.remarks, *said))
 
 
 def _described_by_itself(path: Path, fps: float | None) -> Reading | None:

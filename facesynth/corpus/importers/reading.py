@@ -13,6 +13,7 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.npz import LARGEST_BYTES
 from facesynth.inference.speech import PhoneTrack
+from facesynth.motion.gaps import filled_in
 from facesynth.speech.segments import Segment
 
 
@@ -71,3 +72,12 @@ def motion_of_arrays(
 
 def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
     return None if signal is None else np.asarray(signal, np.float32)
+
+
+def open_gaps(points: NDArray[np.floating]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
+    """Markers [T, K, 3] with NaN where programs wrote a number for a gap, and what is said of it."""
+    unseen = filled_in(points) & ~np.isnan(points).any(axis=2)
+    if not unseen.any():
+        return points, ()
+    said = f"{np.count_nonzero(unseen)} samples are 0, 0, 0 or far from the face, as programs write gaps: they are gaps"
+    return np.where(unseen[..., None], np.nan, points), (said,)

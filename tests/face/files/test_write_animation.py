@@ -162,6 +162,15 @@ def test_timecodes(seconds, rate, text):
     assert timecode(seconds, rate) == text
 
 
+@pytest.mark.parametrize("rate", [24, 30, 60, 120])
+def test_time_codes_come_back_as_the_times_that_were_written(tmp_path, rate):
+    take = take_of(animation_at(float(rate), 3 * rate))
+    write_livelink(tmp_path / "a.csv", take)
+    back = read_livelink(tmp_path / "a.csv")
+    assert back.fps == rate
+    assert back.timecodes == tuple(timecode(k / rate, rate) for k in range(3 * rate))
+
+
 def test_rates_of_television():
     assert exact_fps(23.976) == 24000 / 1001
     assert exact_fps(29.97) == 30000 / 1001
