@@ -39,6 +39,8 @@ RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 """Frames that time codes count in a second."""
 SLOWEST = 23
 """Frame numbers below it tell no rate: a take of half a second has such low ones too."""
+WHOLE_SECOND = (30, 60)
+"""So many frames within one second are taken for all of it, and told; fewer or others do not show the rate."""
 NOON_S, DAY_S = 43200, 86400
 LARGEST_GAP = 50
 """Frames for each row: a table with larger gaps has damaged time codes."""
@@ -109,6 +111,8 @@ def read_take(path: Path, fps: float | None = None) -> Take:
     times_s, counted = _times(path, timecodes, fps)
     frames, rate = _placed(path, timecodes, times_s, counted, fps)
     remarks += said + _lost_and_doubled(frames, values)
+    if fps is None and len({code[:8] for code in timecodes}) == 1:
+        remarks.append(f"the time codes stay within one second: they were taken for a whole second of {counted} fps")
     return Take(tuple(timecodes), named, values, frames, rate, tuple(remarks))
 
 
@@ -182,7 +186,7 @@ def _times(path: Path, timecodes: list[str], fps: float | None) -> tuple[Floats,
     parts = np.array([[int(match[k]) for k in (1, 2, 3, 5)] for match in found], np.int64)
     seconds = parts[:, :3] @ np.array([3600, 60, 1])
     highest = int(parts[:, 3].max()) + 1
-    if fps is None and (highest < SLOWEST or len(np.unique(seconds)) < 2):
+    if fps is None and (highest < SLOWEST or (len(np.unique(seconds)) < 2 and highest not in WHOLE_SECOND)):
         raise FacesynthError(f"{path} is too short to show its frame rate; give it (--fps)")
     shown = max(highest, int(np.ceil(fps - 0.05)) if fps and len(np.unique(seconds)) < 2 else highest)
     counted = min((rate for rate in RATES if rate >= shown), default=shown)
