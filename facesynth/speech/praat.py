@@ -23,7 +23,7 @@ from facesynth.speech.segments import Segment
 LARGEST_BYTES = 2**28
 _TOKEN = re.compile(r'"((?:[^"]|"")*)"|![^\n]*|(?<!\S)<(\w+)>(?!\S)|(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?!\S)')
 _BINARY = b"ooBinaryFile"
-_MOST_TIERS = 10000
+_MOST_TIERS, _MOST_THINGS = 10_000, 10**9
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def read_grid(path: Path) -> Grid:
         text, encoding = decoded(content)
         grid = _from_json(text) if text.lstrip().startswith("{") else _Text(text).grid()
         return _checked(Grid(grid.start_s, grid.end_s, grid.tiers, encoding))
-    except (_BrokenError, ValueError, KeyError, TypeError, AttributeError, struct.error, RecursionError) as error:
+    except (_BrokenError, ValueError, KeyError, TypeError, AttributeError, OverflowError, struct.error, RecursionError) as error:
         raise FacesynthError(f"{path} is not a TextGrid that Praat would read ({' '.join(str(error).split())[:160]})") from None
 
 
@@ -215,7 +215,7 @@ def _json_tier(tier: dict[str, Any]) -> Tier:
 
 
 def _whole(value: float) -> int:
-    if value != int(value) or value < 0:
+    if not (0 <= value < _MOST_THINGS and value == int(value)):
         raise _BrokenError(f"{value:g} is no number of things")
     return int(value)
 
