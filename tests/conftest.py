@@ -11,13 +11,14 @@ RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Tests that share what was trained or built run in one process: those of a file, and all of tests/export.
+    """Tests that share what was trained or built run in one process: those of a file, of `all_trained`, and all of tests/export.
 
     With `--dist loadgroup`, as `make test` says; else each process would build the fixtures of nearly every file anew.
     """
     for item in items:
         group = item.path.parent if item.path.parent.name == "export" else item.path
-        item.add_marker(pytest.mark.xdist_group(str(group.relative_to(item.config.rootpath))))
+        shared = "all_trained" if "trained" in item.fixturenames else str(group.relative_to(item.config.rootpath))
+        item.add_marker(pytest.mark.xdist_group(shared))
 
 
 @pytest.fixture(scope="session")
@@ -75,3 +76,20 @@ def performer(rig, voice):
     from facesynth.performer.build import build_performer
 
     return build_performer("small")
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory):
+    """A small corpus that no test changes."""
+    from corpora import tiny_corpus
+
+    return tiny_corpus(tmp_path_factory.mktemp("tiny") / "corpus", utterances=16, fps=60)
+
+
+@pytest.fixture(scope="session")
+def all_trained(tiny):
+    """Every method by name, each trained once on the small corpus."""
+    from every_method import METHODS, trained_on
+
+    with pytest.MonkeyPatch.context() as patch:
+        return {name: trained_on(tiny, name, patch) for name in METHODS}

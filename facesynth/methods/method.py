@@ -12,7 +12,7 @@ import torch
 from torch import nn
 
 from facesynth.corpus import Corpus
-from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.errors import FacesynthError, reject_options, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
@@ -97,9 +97,13 @@ class Method(nn.Module):
     def synthesize(self, speech: Speech, *, seed: int = 0) -> Motion:
         """Motion for new speech, as long as its phone track, at the rate the method learned.
 
-        A method adds options of its own as keywords.
+        A method adds options of its own as keywords; whatever else is given it hands to `refuse`.
         """
         raise NotImplementedError
+
+    def refuse(self, options: Mapping[str, Any]) -> None:
+        """FacesynthError where a caller gives options of `synthesize` that the method does not have."""
+        reject_options(self.name, options, ("seed", *(option.name for option in self.capabilities.options)))
 
     @property
     def device(self) -> torch.device:
@@ -110,11 +114,22 @@ class Method(nn.Module):
     def fitted_layout(self) -> Layout:
         """The layout learned from; FacesynthError before `fit`."""
         if self.layout is None:
-            raise FacesynthError(f"this {self.name} model is not trained; call fit(corpus) or load(path) first")
+            raise FacesynthError(
+                f"this {self.name} model is not trained; call fit(corpus) or load(path) first (every `fit` begins with"
+                " self.learned_from(corpus))"
+            )
         return self.layout
 
-    def learned_from(self, corpus: Corpus) -> None:
-        """Remember what every saved model states of its training data; FacesynthError for a layout that it does not learn."""
+    def learned_from(self, corpus: Corpus, *, silent: bool = False) -> None:
+        """Remember layout, rate, emotions and origin of the corpus, which a saved model states: the first line of every `fit`.
+
+        FacesynthError where nothing is in it to learn from, or a layout that the method does not learn. silent: recordings
+        without sound, which are of no use for speech, teach the method as well.
+        """
+        if not (corpus.records if silent else corpus.usable_records):
+            raise FacesynthError(
+                f"{corpus.path} has no usable utterance to learn from; record more, or see `facesynth corpus check`"
+            )
         kind, known = corpus.layout.kind, self.capabilities.layouts
         if kind not in known:
             raise FacesynthError(f"{self.name} learns {' or '.join(known)}; {corpus.path} holds {kind}")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import checked_audio, checked_seed
+from ..errors import reject_options
 from ..layout import Layout
 from ..motion import Motion
 from ..pitch import RATE
@@ -101,8 +102,9 @@ class HeadHmm:
         """Hz of the sound that it listens to."""
         return RATE
 
-    def synthesize(self, speech: Any, *, seed: int = 0) -> Motion:
+    def synthesize(self, speech: Any, *, seed: int = 0, **options: Any) -> Motion:
         """Head motion for speech, of which only the sound counts."""
+        reject_options("head_hmm", options, ("seed",))
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         audio = resample(checked_audio(speech.audio), speech.sample_rate, RATE)
         clusters = self.clusters(audio, max(1, round(count / self.fps * HEARD_FPS)))

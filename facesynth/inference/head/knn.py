@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import checked_audio, checked_piece, checked_rate, require_open
-from ..errors import FacesynthError
+from ..errors import FacesynthError, reject_options
 from ..layout import Layout
 from ..motion import Motion
 from ..pitch import RATE
@@ -84,8 +84,9 @@ class HeadKnn:
         """Hz of the sound that it listens to."""
         return RATE
 
-    def synthesize(self, speech: Any, *, seed: int = 0, head_keys: HeadKeys | None = None) -> Motion:
+    def synthesize(self, speech: Any, *, seed: int = 0, head_keys: HeadKeys | None = None, **options: Any) -> Motion:
         """Head motion for speech, of which only the sound counts; nothing is random."""
+        reject_options("head_knn", options, ("seed", "head_keys"))
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         head = self.head(resample(checked_audio(speech.audio), speech.sample_rate, RATE), count, head_keys or HeadKeys.none())
         return Motion(np.tile(self.frame, (count, 1)), self.fps, self.layout, head.astype(np.float32))

@@ -12,7 +12,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import MEAN_FACE
-from facesynth.methods.learn.frames import mean_pose, refuse_options
+from facesynth.methods.learn.frames import mean_pose
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
@@ -36,7 +36,7 @@ class MeanFace(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """The mean pose, for as long as the phones last."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         layout = self.fitted_layout
         count = int(speech.phones.frame_bounds(self.fps)[-1])
         return Motion(np.tile(self.mean.cpu().numpy(), (count, 1)), self.fps, layout)

@@ -15,7 +15,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import NEUTRAL, PhoneTrack, Speech
 from facesynth.methods.baselines.capabilities import PHONE_MEAN
-from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
+from facesynth.methods.learn.frames import PoseSum, mean_pose
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
@@ -57,7 +57,7 @@ class PhoneMean(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Poses at the middles of the phones, and between them the cubic that never overshoots (PCHIP)."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         layout = self.fitted_layout
         targets = self._targets(speech)
         knots_s, owners = _knots(speech.phones)

@@ -13,7 +13,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import RIDGE
-from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
+from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method
@@ -69,7 +69,7 @@ class Ridge(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Motion predicted frame by frame."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         layout = self.fitted_layout
         count = int(speech.phones.frame_bounds(self.fps)[-1])
         frames = self.pca.decode(self._heard(speech, count) @ self.weights + self.bias)

@@ -14,7 +14,7 @@ from facesynth.inference.filters import spline_at
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import TCN
-from facesynth.methods.learn.frames import complete, complete_frames, refuse_options
+from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
 from facesynth.methods.method import Method
@@ -59,7 +59,7 @@ class Tcn(Method):
     @torch.no_grad()
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Motion predicted at RATE, between its frames a cubic spline."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         layout = self.fitted_layout
         times_s = np.arange(int(np.ceil(speech.duration_s * RATE)) + 1) / RATE
         heard = self.hearing.at(speech, times_s).T[None]  # [1, W, F]

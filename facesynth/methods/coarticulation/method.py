@@ -22,7 +22,7 @@ from facesynth.methods.coarticulation.capabilities import CAPABILITIES
 from facesynth.methods.coarticulation.keys import learn_keys
 from facesynth.methods.coarticulation.recordings import Track, samples_of, track_of, transitions_of, usable
 from facesynth.methods.coarticulation.transitions import learn_models
-from facesynth.methods.learn.frames import mean_pose, refuse_options
+from facesynth.methods.learn.frames import mean_pose
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
@@ -106,15 +106,15 @@ class Coarticulation(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Motion from phones alone; the sound is not heard, emotions are not felt. Nothing is random."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         return self.speaker().synthesize(speech)
 
     def speaker(self) -> Runtime:
         """The model that speaks: what an exported folder is, with this module's arrays for its graph."""
-        gap = self.facts["closed_gap"]
+        layout, gap = self.fitted_layout, self.facts.get("closed_gap")
         return Runtime(
             Parts(
-                layout=self.fitted_layout,
+                layout=layout,
                 fps=self.fps,
                 emotions=self.emotions,
                 keys=KeyShapes(**{name: as_doubles(_array(getattr(self, name))) for name in KEY_FIELDS}),

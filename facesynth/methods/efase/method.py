@@ -236,12 +236,13 @@ class Efase(Method):
         fps: float | None = None,
         constraints: Mapping[int, str] | None = None,
         look_ahead: int | None = None,
+        **options: Any,
     ) -> Motion:
         """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name.
 
         look_ahead: settle each phone when that many more are known, as a stream does. See `inference.efase.model`.
         """
-        return self.speaker.synthesize(speech, seed=seed, fps=fps, constraints=constraints, look_ahead=look_ahead)
+        return self.speaker.synthesize(speech, seed=seed, fps=fps, constraints=constraints, look_ahead=look_ahead, **options)
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one, frames as soon as they are final; see `inference.efase.model`."""

@@ -17,7 +17,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import NEUTRAL, Speech
 from facesynth.methods.expression.capabilities import CAPABILITIES
 from facesynth.methods.expression.differences import Difference, Floats, difference_of, says_the_same, twins, whole_runs
-from facesynth.methods.learn.frames import PoseSum, mean_pose, refuse_options
+from facesynth.methods.learn.frames import PoseSum, mean_pose
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
@@ -67,6 +67,7 @@ class Expression(Method):
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from sentences that were recorded in neutral and in an emotion; nothing is drawn from chance."""
+        device = self.device
         self.learned_from(corpus)
         differences, unlike = differences_of(corpus)
         emotions, left_out = expressions_of(differences, corpus, unlike)
@@ -83,11 +84,11 @@ class Expression(Method):
             "emotions_left_out": left_out,
         }
         self.speaker().textures  # noqa: B018 - no recording may be shorter than a patch
-        return self.eval()
+        return self.to(device).eval()
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """A face that feels what the speech's emotions say, and speaks not."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         return self.speaker().synthesize(speech, seed=seed)
 
     def express(self, motion: Motion, speech: Speech, *, seed: int = 0) -> Motion:

@@ -21,7 +21,6 @@ from facesynth.methods.capabilities import Account
 from facesynth.methods.eyes.capabilities import CAPABILITIES
 from facesynth.methods.eyes.patch_size import patch_size
 from facesynth.methods.eyes.recordings import at_rate, compensation_in, opening_of, shut_level, texture_of, whole_pieces
-from facesynth.methods.learn.frames import refuse_options
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
@@ -83,7 +82,7 @@ class Eyes(Method):
 
         lids: another corpus that lends its lids, where the eyes of this one were recorded without.
         """
-        self.learned_from(corpus)
+        self.learned_from(corpus, silent=True)
         lent = None if lids is None else [motion for motion, _ in recorded_eyes(lids)]
         self.learn([motion for motion, _ in recorded_eyes(corpus)], str(corpus.path), lids=lent, seed=seed)
         if lids is not None:
@@ -109,7 +108,7 @@ class Eyes(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Eyes for a head that is still, and the head as far as their wide shifts turn it; nothing that is said is heard."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         return self.runtime().synthesize(speech, seed=seed)
 
     def look(self, motion: Motion, *, seed: int = 0) -> Motion:
@@ -123,10 +122,11 @@ class Eyes(Method):
 
     def runtime(self) -> Runtime:
         """The model that moves eyes: what an exported folder is."""
+        layout = self.fitted_layout
         if self._runtime is None:
             settings = PatchSettings(*(self.facts[name] for name in ("patch", "boundary", "tolerance")))
             frames, starts = (tensor.detach().cpu().numpy() for tensor in (self.frames, self.starts))
-            layout, gain = self.fitted_layout, float(self.facts["compensation"])
+            gain = float(self.facts["compensation"])
             self._runtime = Runtime(Parts(layout, self.fps, self.emotions, frames, starts, settings, gain))
         return self._runtime
 

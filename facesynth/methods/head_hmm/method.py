@@ -19,7 +19,6 @@ from facesynth.inference.speech import Speech
 from facesynth.methods.head_hmm.baum_welch import NEVER, Hmm, begun, learn
 from facesynth.methods.head_hmm.capabilities import CAPABILITIES
 from facesynth.methods.head_hmm.codebook import codebook
-from facesynth.methods.learn.frames import refuse_options
 from facesynth.methods.learn.heads import about_mean, angles_at, sound_windows, still_face, with_head
 from facesynth.methods.method import Method
 from facesynth.methods.parts import part
@@ -94,8 +93,8 @@ class HeadHmmMethod(Method):
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from the recordings in which the head's pose is known; nothing is drawn from chance."""
-        recordings = with_head(corpus)
         self.learned_from(corpus)
+        recordings = with_head(corpus)
         angles = [angles_at(u, HEARD_FPS) for u in recordings]
         angles = about_mean(angles) if self.config["centred"] else angles
         prosody = [prosody_of(sound_windows(u, HEARD_FPS, len(a)), HEARD_FPS) for u, a in zip(recordings, angles, strict=True)]
@@ -117,7 +116,7 @@ class HeadHmmMethod(Method):
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Head motion from the sound; the seed moves key points a little."""
-        refuse_options(self.name, options)
+        self.refuse(options)
         return self.speaker().synthesize(speech, seed=seed)
 
     def speaker(self) -> HeadHmm:
@@ -159,8 +158,9 @@ class HeadHmmMethod(Method):
             "mixture_means": np.concatenate([m.mixtures.means for m in models]),
             "mixture_variances": np.concatenate([m.mixtures.variances for m in models]),
         }
+        device = self.device
         for name, array in arrays.items():
-            self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)))
+            self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)).to(device))
 
 
 def composed(models: list[Hmm], first: Floats, bigram: Floats, weight: float) -> Network:

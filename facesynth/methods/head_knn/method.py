@@ -98,8 +98,8 @@ class HeadKnnMethod(Method):
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from the recordings in which the head's pose is known; FacesynthError for fewer than two."""
-        recordings = with_head(corpus)
         self.learned_from(corpus)
+        recordings = with_head(corpus)
         entry_of = self._learn_database(recordings, still_face(corpus))
         given = [self.config[name] for name in ("near", "rough", "away")]
         if any(given):
@@ -119,8 +119,9 @@ class HeadKnnMethod(Method):
         self.facts |= {"validation_error": found.error, "validated_on": [recordings[i].id for i in left_out]}
         return self.eval()
 
-    def synthesize(self, speech: Speech, *, seed: int = 0, head_keys: HeadKeys | None = None) -> Motion:
+    def synthesize(self, speech: Speech, *, seed: int = 0, head_keys: HeadKeys | None = None, **options: Any) -> Motion:
         """Head motion from the sound, through key poses where some are given; nothing is random."""
+        self.refuse(options)
         return self.speaker().synthesize(speech, seed=seed, head_keys=head_keys)
 
     def stream(
@@ -186,7 +187,7 @@ class HeadKnnMethod(Method):
         return sorted(int(i) for i in rng.permutation(len(recordings))[:count])
 
     def _keep(self, name: str, array: Any) -> None:
-        self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)))
+        self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array, np.float32)).to(self.device))
 
 
 def segment_of(model: HeadKnn, utterance: Utterance) -> Segment:

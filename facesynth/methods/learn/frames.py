@@ -1,9 +1,6 @@
-"""What the reference methods take from a corpus, and what they all refuse."""
+"""What the reference methods take from a corpus."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +30,6 @@ class PoseSum:
 
 def mean_pose(corpus: Corpus) -> NDArray[np.float64]:
     """[C] mean of all recorded samples; FacesynthError where a channel has none."""
-    if not len(corpus):
-        raise FacesynthError(f"{corpus.path} has no usable utterance to learn from; record more, or see `facesynth corpus check`")
     poses = PoseSum(corpus.layout.channels)
     for utterance in corpus:
         poses.add(utterance.motion.frames)
@@ -57,12 +52,6 @@ def complete_frames(corpus: Corpus) -> NDArray[np.float32]:
     if len(kept) < 2:
         raise FacesynthError(f"{corpus.path} has {len(kept)} frames without gaps; at least 2 are needed: fill or record more")
     return kept
-
-
-def refuse_options(method: str, options: Mapping[str, Any]) -> None:
-    """FacesynthError where a caller asks a method without options for something."""
-    if options:
-        raise FacesynthError(f"{method} has no option {sorted(options)[0]!r}; leave it out")
 
 
 def _missing(layout: Layout, count: NDArray[np.int64]) -> str:
