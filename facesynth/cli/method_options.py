@@ -29,34 +29,22 @@ class WithMethodOptions(click.Command):
             with formatter.section(title):
                 formatter.write_dl(records)
 
+    def options_of_methods(self) -> tuple[dict[str, Option], list[str]]:
+        """All methods' own options by name, and a line for each that is left out."""
+        from facesynth.methods.registry import own_options
+
+        flags = {flag.lstrip("-").replace("-", "_") for param in self.params for flag in (*param.opts, param.name or "")}
+        return own_options({*flags, "help", "h"})
+
+    def taken_apart(self, given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What was given: the command's own options, and the methods' own that were given."""
+        names = self.options_of_methods()[0]
+        own = {name: value for name, value in given.items() if name in names and value is not None}
+        return {name: value for name, value in given.items() if name not in names}, own
+
     def _brought(self) -> list[click.Option]:
-        taken = {name for p in self.params for name in (*p.opts, p.name)} | {"--help", "-h"}
-        options, _ = own_options()
-        return [
-            click.Option([option.flag], type=type_of(option), help=option.help)
-            for name, option in options.items()
-            if not {name, option.flag} & taken
-        ]
-
-
-def own_options() -> tuple[dict[str, Option], list[str]]:
-    """All methods' own options by name, and a line for each method that cannot say or contradicts another."""
-    from facesynth.methods.registry import known_capabilities
-
-    known, broken = known_capabilities()
-    options: dict[str, Option] = {}
-    for one in known:
-        for option in one.options:
-            if options.setdefault(option.name, option).type is not option.type:
-                broken.append(f"{one.name} takes {option.flag} as another kind of value than another method; it is left out")
-    return options, broken
-
-
-def taken_apart(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What was given: the command's own options, and the methods' own that were given."""
-    names = own_options()[0]
-    own = {name: value for name, value in given.items() if name in names and value is not None}
-    return {name: value for name, value in given.items() if name not in names}, own
+        options = self.options_of_methods()[0].values()
+        return [click.Option([option.flag], type=type_of(option), help=option.help) for option in options]
 
 
 def files_among(own: dict[str, Any]) -> list[str]:

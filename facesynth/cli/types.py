@@ -88,10 +88,11 @@ def type_of(option: Option) -> click.ParamType:
     """What a method's own option is given as."""
     if option.type is Path:
         return FILE
+    bounded = option.least is not None or option.most is not None
     if option.type is int:
-        return click.IntRange(_whole(option.least), _whole(option.most))
+        return click.IntRange(_whole(option.least), _whole(option.most)) if bounded else click.INT
     if option.type is float:
-        return click.FloatRange(option.least, option.most)
+        return click.FloatRange(option.least, option.most) if bounded else click.FLOAT
     return click.BOOL if option.type is bool else click.STRING
 
 

@@ -7,7 +7,7 @@ type `Capabilities`. Listing names imports none of them; asking what they can do
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import resolve_name
@@ -79,13 +79,42 @@ def capabilities_of(name: str) -> Capabilities:
 
 def known_capabilities() -> tuple[list[Capabilities], list[str]]:
     """Of all methods, in the order of what they need to learn from; and a line for each that cannot say."""
-    known, broken = [], []
+    known, broken = (
+        [],
+        [
+            f"{_said_by(entry)} is left out: {entry.name} is one of facesynth's own methods; give it another name"
+            for entry in entry_points(group=GROUP)
+            if entry.name in BUILT_IN
+        ],
+    )
     for name in [*BUILT_IN, *(name for name in list_methods() if name not in BUILT_IN)]:
         try:
             known.append(capabilities_of(name))
         except FacesynthError as error:
             broken.append(str(error))
     return sorted(known, key=lambda one: one.minutes), broken
+
+
+def own_options(taken: Collection[str]) -> tuple[dict[str, Option], list[str]]:
+    """All methods' own options of `speak` by name, ours first; and a line for each that is left out, or method that cannot say.
+
+    An option is left out that is called as one that every model has (`taken`), or that is another kind of value elsewhere.
+    """
+    known, broken = known_capabilities()
+    options: dict[str, Option] = {}
+    owners: dict[str, str] = {}
+    for one in sorted(known, key=lambda one: one.name not in BUILT_IN):
+        for option in one.options:
+            if option.name in taken:
+                broken.append(f"{one.name}: {option.flag} is an option of every model and is left out; call it otherwise")
+                continue
+            owner = owners.setdefault(option.name, one.name)
+            if options.setdefault(option.name, option).type is not option.type:
+                broken.append(
+                    f"{one.name} takes {option.flag} as a {option.type.__name__}, but {owner} as a"
+                    f" {options[option.name].type.__name__}: it is left out; call it otherwise"
+                )
+    return options, broken
 
 
 def needs() -> list[Need]:

@@ -13,9 +13,12 @@ from mocap_files import write_c3d
 from facesynth.cli.corpus import corpus_group
 from facesynth.corpus import Corpus
 from facesynth.corpus.add.add import add
+from facesynth.corpus.add.recordings import find_recordings
 from facesynth.corpus.importers.convert import convert
 from facesynth.corpus.importers.description import Description, Written, turned
-from facesynth.corpus.importers.formats import read
+from facesynth.corpus.importers.formats import FORMATS, Format, read
+from facesynth.corpus.importers.reading import Reading, motion_of_arrays
+from facesynth.corpus.importers.video import corpus_from_video
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.speech.audio import save_wav
@@ -143,6 +146,34 @@ def test_curves_that_name_themselves_need_no_layout(tmp_path):
     (tmp_path / "d.csv").write_text("a,b\n1,2\n")
     with pytest.raises(FacesynthError, match="does not state its rate"):
         read(tmp_path / "d.csv")
+
+
+def test_a_new_format_is_a_line_of_the_table(tmp_path, monkeypatch):
+    """What reads one file of it makes it known to `corpus add`, to its messages and to `corpus convert`."""
+
+    def toyface(path, asked):
+        values = np.array(path.read_text(encoding="utf-8").split(), float)[:, None]
+        return Reading(motion_of_arrays(path, values, asked.fps or 30, Layout("curves", ("jawOpen",) * int(values.max()))))
+
+    with pytest.raises(FacesynthError, match=r"no recording to make one from .*\.toyface is neither sound, motion \(\.c3d"):
+        begin_corpus(tmp_path / "take")
+    monkeypatch.setitem(FORMATS, ".toyface", Format(toyface))
+    with pytest.raises(FacesynthError, match=r"no sound file of this name beside a\.toyface.*\.npz, \.toyface\) with its sound"):
+        begin_corpus(tmp_path / "take")
+    save_wav(tmp_path / "take" / "a.wav", np.zeros(16000, np.float32), 16000)
+    found, refused = find_recordings([tmp_path / "take"])
+    assert (found[0].motion.name, refused) == ("a.toyface", {})
+    report = convert([tmp_path / "take"], tmp_path / "out")
+    assert (report.converted, report.fps) == (("a",), 30)
+    (tmp_path / "take" / "a.toyface").write_text("0 2 0 1", encoding="utf-8")
+    with pytest.raises(FacesynthError, match=r"a\.toyface: a layout needs unique names"):
+        read(tmp_path / "take" / "a.toyface")
+
+
+def begin_corpus(take):
+    take.mkdir(exist_ok=True)
+    (take / "a.toyface").write_text("0 1 0 1", encoding="utf-8")
+    return corpus_from_video(take.with_name("c"), [take], {"performer": "A", "emotions": ["neutral"]})
 
 
 def test_what_does_not_say_enough_says_so(tmp_path):

@@ -149,7 +149,7 @@ def test_sound_that_was_recorded_apart_is_laid_on_the_video(clips):
 
 def test_nothing_to_make_a_corpus_from_is_one_clear_error(tmp_path):
     (tmp_path / "a.wav").touch()
-    with pytest.raises(FacesynthError, match="is no corpus yet, and there is no video"):
+    with pytest.raises(FacesynthError, match="is no corpus yet, and there is no recording"):
         corpus_from_video(tmp_path / "c", [tmp_path / "a.wav"], {"performer": "A", "emotions": ["neutral"]})
     (tmp_path / "a.mp4").write_bytes(b"x" * 100)
     with pytest.raises(FacesynthError, match=r"a\.mp4|facesynth fetch landmarks"):

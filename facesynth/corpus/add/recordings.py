@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.corpus.add.transcripts import is_table
-from facesynth.corpus.importers.beat import is_beat
+from facesynth.corpus.importers.formats import FORMATS
 from facesynth.inference.errors import FacesynthError
-from facesynth.motion.livelink import is_live_link
 from facesynth.speech.textgrid import is_silence_mark
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
 VIDEO = frozenset(
     {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".flv", ".3gp", ".wmv", ".ogv"}
 )
-MOTION = frozenset({".npz", ".csv", ".c3d", ".mat", ".json"})
-OWN_SOUND = frozenset({".c3d", ".mat"})
-"""Motion files that may hold the sound as well."""
+MOTION = FORMATS.keys()
 PHONES = frozenset({".textgrid", ".lab", ".phn"})
 WORDS = frozenset({".align", ".wrd"})
 """Lines of `start end word`, as GRID and TIMIT come with; the times are not used."""
 EMOTIONS = ".emotions.csv"
-KINDS = {
+KINDS: Mapping[str, Collection[str]] = {
     "sound": AUDIO | VIDEO,
     "motion": MOTION,
     "phones": PHONES,
@@ -67,7 +64,8 @@ def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[
     for file in files:
         name, kind = _name_and_kind(file)
         if kind is None:
-            refused[file.name] = f"{file.suffix or 'a file without suffix'} is neither sound, motion, phones nor text"
+            what = file.suffix or "a file without suffix"
+            refused[file.name] = f"{what} is neither sound, motion ({', '.join(sorted(MOTION))}), phones nor text"
         else:
             groups.setdefault(name, {}).setdefault(kind, []).append(file)
     groups = _joined_if_one_pair(groups)
@@ -105,7 +103,7 @@ def _name_and_kind(file: Path) -> tuple[str, str | None]:
     name = unicodedata.normalize("NFC", file.name)
     for kind, suffixes in reversed(KINDS.items()):
         for suffix in suffixes:
-            if name.lower().endswith(suffix) and (suffix != ".json" or is_beat(file)):
+            if name.lower().endswith(suffix) and (kind != "motion" or FORMATS[suffix].knows(file)):
                 return name[: -len(suffix)], kind
     return name, None
 
@@ -137,8 +135,8 @@ def _with_own_sound(group: dict[str, list[Path]]) -> dict[str, list[Path]]:
     motions = group.get("motion", [])
     if "sound" in group or len(motions) != 1:
         return group
-    suffix = motions[0].suffix.lower()
-    return {**group, "sound": motions} if suffix in OWN_SOUND or (suffix == ".csv" and is_live_link(motions[0])) else group
+    alone = FORMATS[motions[0].suffix.lower()].stands_alone(motions[0])
+    return {**group, "sound": motions} if alone else group
 
 
 def _fault(group: Mapping[str, list[Path]]) -> str:

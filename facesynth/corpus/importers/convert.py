@@ -13,7 +13,7 @@ import numpy as np
 from facesynth.atomic import atomic_path, write_text
 from facesynth.corpus.add.recordings import AUDIO, VIDEO, Recording, find_recordings
 from facesynth.corpus.importers.description import LAYOUT, Description, description_text
-from facesynth.corpus.importers.formats import SUFFIXES, read
+from facesynth.corpus.importers.formats import FORMATS, read
 from facesynth.corpus.importers.reading import Reading
 from facesynth.corpus.importers.session import Session, survey
 from facesynth.corpus.motion_files import with_points_of
@@ -39,7 +39,7 @@ class ConvertReport:
 def convert(
     paths: Iterable[str | Path], folder: str | Path, *, description: Description | None = None, fps: float | None = None
 ) -> ConvertReport:
-    """Read every C3D, CSV, NPZ and MAT of files and folders; write motion, sound, phones and words in or beside them.
+    """Read every motion file among files and in folders; write motion, sound, phones and words in or beside them.
 
     The layout that most recordings share is written beside them as `layout.yaml`, with the rest pose of all; those that
     lack channels of it are refused, as is what cannot be read, each with the reason; the others are converted.
@@ -125,8 +125,8 @@ def _files(paths: Iterable[str | Path]) -> list[Path]:
     found: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            found += sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith("."))
-        elif path.suffix.lower() in SUFFIXES or not path.is_file():
+            found += sorted(file for file in path.iterdir() if file.suffix.lower() in FORMATS and not file.name.startswith("."))
+        elif path.suffix.lower() in FORMATS or not path.is_file():
             found.append(path)
     return found
 

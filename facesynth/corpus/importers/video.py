@@ -15,7 +15,7 @@ from facesynth.capture.landmarks import OUTER_CORNERS_MM, landmark_layout
 from facesynth.capture.motion import motion_of
 from facesynth.capture.shape import neutral_shape
 from facesynth.capture.track import Track
-from facesynth.corpus.add.recordings import VIDEO, find_recordings
+from facesynth.corpus.add.recordings import MOTION, VIDEO, find_recordings
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.inference.errors import FacesynthError
@@ -46,8 +46,8 @@ def corpus_from_video(
     if not videos:
         reason = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:2])
         raise FacesynthError(
-            f"{folder} is no corpus yet, and there is no video to make one from{f' ({reason})' if reason else ''};"
-            " make one with `facesynth corpus new`"
+            f"{folder} is no corpus yet, and there is no recording to make one from{f' ({reason})' if reason else ''};"
+            f" give videos, or motion ({', '.join(sorted(MOTION))}) with its sound under the same name"
         )
     tracks = _calibration(videos, face, workers)
     layout = landmark_layout(neutral_shape(tracks))
