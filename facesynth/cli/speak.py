@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.method_options import WithMethodOptions, files_among, own_options, taken_apart
+from facesynth.cli.method_options import WithMethodOptions, files_among
 from facesynth.cli.recordings import recordings
 from facesynth.cli.targets import plan_targets, require_free
 from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size
@@ -111,7 +111,7 @@ def speak(
     from facesynth.stage.performance import check_output
     from facesynth.stage.speaking import produce
 
-    for line in own_options()[1]:
+    for line in speak.options_of_methods()[1]:
         _tell(f"warning: {line}")
     place, request = device_of(device), _request(text_file, given)
     targets, paths = [check_output(path) for path in outputs], recordings(speech)
@@ -134,7 +134,7 @@ def _request(text_file: Path | None, given: dict[str, Any]) -> Request:
     from facesynth.stage.listening import read_text
     from facesynth.stage.request import Request
 
-    asked, own = taken_apart(given)
+    asked, own = speak.taken_apart(given)
     if text_file is not None:
         if asked["text"] is not None:
             raise FacesynthError("both --text and --text-file were given; give one")

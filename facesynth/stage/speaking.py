@@ -14,7 +14,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Accounting, Explaining
 from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, known_capabilities, load, require
+from facesynth.methods.registry import ask, load, own_options, require
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.hearing import Heard
 from facesynth.stage.cast import Cast, cast_for
@@ -148,10 +148,10 @@ def speak(model: str | Path, recording: str | Path, *outputs: str | Path, **aske
     """
     known = {field.name for field in fields(Request)} - {"own"}
     own = {name: value for name, value in asked.items() if name not in known}
-    options = {option.name for one in known_capabilities()[0] for option in one.options}
+    options, _ = own_options(known)
     for name in own:
         if name not in options:
-            raise unknown("option of speak", name, known | options)
+            raise unknown("option of speak", name, known | options.keys())
     request = Request(own=own, **{name: value for name, value in asked.items() if name in known})
     targets = [check_output(path) for path in outputs]
     return produce(load(model), targets, request).say(Path(recording), targets, lambda _: None)

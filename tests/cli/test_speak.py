@@ -1,6 +1,7 @@
 """The real command line on a small corpus: what it writes, and how it refuses."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +12,11 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli, main
+from facesynth.cli.speak import speak
 from facesynth.methods.efase.method import Efase
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
+from facesynth.stage.performance import OUTPUTS
 
 
 def run(*arguments):
@@ -232,3 +235,10 @@ def test_the_entry_point_leaves_with_code_2():
     code, _, error = run("speak", "nothing.safetensors", "nothing.wav", "-o", "x.npz")
     assert code == 2
     assert error.strip().count("\n") == 0
+
+
+def test_help_and_manual_name_every_output(repository):
+    said = next(param.help for param in speak.params if param.name == "outputs")
+    assert set(re.findall(r"\.[a-z0-9]+", said)) == set(OUTPUTS)
+    table = (repository / "docs" / "own_head.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\.\w+)` \|", table, re.MULTILINE)) == set(OUTPUTS)

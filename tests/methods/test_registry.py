@@ -7,7 +7,9 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
+from click.testing import CliRunner
 
+from facesynth.cli.speak import speak
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods import capabilities as abilities
 from facesynth.methods.registry import (
@@ -113,4 +115,29 @@ def test_a_class_that_is_not_registered_where_it_is_said_to_be(packages):
 def test_a_name_of_ours_cannot_be_taken_over(packages):
     packages("mean_face", "thief:CAPABILITIES", "raise RuntimeError")
     assert create("mean_face").name == "mean_face"
+    assert ["thief is left out: mean_face is one of facesynth's own" in line for line in known_capabilities()[1]] == [True]
     assert Path(inspect.getfile(method_class("mean_face"))).stem == "mean_face"
+
+
+def test_options_are_called_as_no_option_of_every_model_and_mean_one_kind_of_value():
+    options, left_out = speak.options_of_methods()
+    assert left_out == []
+    for name in list_methods():
+        for option in capabilities_of(name).options:
+            assert options[option.name].type is option.type, f"{name} takes {option.flag} otherwise than another method"
+
+
+def test_an_option_that_is_taken_is_left_out_of_the_new_method_and_stays_with_the_others(packages):
+    code = "from facesynth.methods.capabilities import Capabilities, Option\n"
+    code += "HERE = Capabilities('greedy', options=(Option('seed', str, ''), Option('noise', str, ''), Option('zest', int, '')))"
+    packages("greedy", "greedily:HERE", code)
+    options, left_out = speak.options_of_methods()
+    assert (options["noise"].type, options["zest"].type, "seed" in options) == (float, int, False)
+    assert left_out == [
+        "greedy: --seed is an option of every model and is left out; call it otherwise",
+        "greedy takes --noise as a str, but lds as a float: it is left out; call it otherwise",
+    ]
+    assert speak.taken_apart({"seed": 3, "noise": 0.5, "zest": None}) == ({"seed": 3}, {"noise": 0.5})
+    said = CliRunner().invoke(speak, ["--help"]).output
+    assert "--zest INTEGER" in said
+    assert "None" not in said
