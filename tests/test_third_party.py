@@ -11,8 +11,10 @@ from click.testing import CliRunner
 from corpora import tiny_corpus
 
 from facesynth.cli import cli
+from facesynth.corpus import Corpus
 from facesynth.evaluation import jobs
 from facesynth.face.files.npz import read_npz
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods import registry
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
@@ -31,8 +33,8 @@ def installed(tmp_path_factory, repository):
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder / "site")
         yield folder
-    registry._CLASSES.pop("loudness", None)
-    sys.modules.pop("facesynth_loudness", None)
+    registry._CLASSES.pop("loud_face", None)
+    sys.modules.pop("facesynth_loud_face", None)
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +44,8 @@ def shop(installed):
     speech = corpus[corpus.ids[0]].speech
     save_wav(installed / "clip.wav", speech.audio, speech.sample_rate)
     write_textgrid(installed / "clip.TextGrid", speech.phones)
-    said = ran("train", "loudness", corpus.path, "window_s=0.05", "-o", installed / "loudness.safetensors")
-    assert "loudness learned from 12 utterances" in said.stdout
+    said = ran("train", "loud_face", corpus.path, "window_s=0.05", "-o", installed / "loud_face.safetensors")
+    assert "loud_face learned from 12 utterances" in said.stdout
     return installed
 
 
@@ -55,16 +57,16 @@ def ran(*arguments):
 
 @pytest.mark.usefixtures("installed")
 def test_it_is_listed_with_its_own_option():
-    assert "loudness" in registry.list_methods()
+    assert "loud_face" in registry.list_methods()
     said = " ".join(ran("speak", "--help").stdout.split())
-    assert "Options of loudness: --liveliness" in said
+    assert "Options of loud_face: --liveliness" in said
 
 
 def test_it_speaks_and_its_option_counts(shop):
     lively = {}
     for factor in (0, 1, 2):
         out = shop / f"{factor}.npz"
-        ran("speak", shop / "loudness.safetensors", shop / "clip.wav", "--liveliness", factor, "-o", out, "--head", "off")
+        ran("speak", shop / "loud_face.safetensors", shop / "clip.wav", "--liveliness", factor, "-o", out, "--head", "off")
         lively[factor] = np.ptp(read_npz(out)[1].frames, axis=0)
     assert (lively[0] == 0).all()
     assert lively[1].max() > 0
@@ -75,20 +77,25 @@ def test_it_speaks_and_its_option_counts(shop):
     ("option", "message"),
     [
         (("--liveliness", 9), "liveliness"),
-        (("--look-ahead", 2), "loudness has no option --look-ahead; it is one of anime_graph"),
-        (("--explain", "why.json"), "loudness tells nothing of its choices"),
+        (("--look-ahead", 2), "loud_face has no option --look-ahead; it is one of anime_graph"),
+        (("--explain", "why.json"), "loud_face tells nothing of its choices"),
     ],
 )
 def test_what_it_cannot_do_is_refused_in_one_line(shop, option, message):
-    arguments = ["speak", shop / "loudness.safetensors", shop / "clip.wav", "-o", shop / "no.npz", *option]
+    arguments = ["speak", shop / "loud_face.safetensors", shop / "clip.wav", "-o", shop / "no.npz", *option]
     result = CliRunner().invoke(cli, list(map(str, arguments)))
     assert result.exit_code != 0
     assert message in f"{result.output} {result.exception}"
     assert not (shop / "no.npz").exists()
 
 
+def test_it_refuses_a_corpus_without_recordings(shop):
+    with pytest.raises(FacesynthError, match="no usable utterance"):
+        registry.create("loud_face").fit(Corpus.open(shop / "actor").subset([]))
+
+
 def test_it_is_compared(shop, monkeypatch):
     monkeypatch.setattr(jobs, "peak_speaking_mb", lambda *_: None)
-    made = ran("evaluate", shop / "actor", "loudness", "mean_face", "--folds", 2, "--no-references", "--no-video",
+    made = ran("evaluate", shop / "actor", "loud_face", "mean_face", "--folds", 2, "--no-references", "--no-video",
                "-o", shop / "report", "--json")  # fmt: skip
-    assert {row["label"] for row in json.loads(made.stdout)["rows"]} == {"second take", "loudness", "mean_face"}
+    assert {row["label"] for row in json.loads(made.stdout)["rows"]} == {"second take", "loud_face", "mean_face"}

@@ -21,7 +21,7 @@ PHONES = frozenset({".textgrid", ".lab", ".phn"})
 WORDS = frozenset({".align", ".wrd"})
 """Lines of `start end word`, as GRID and TIMIT come with; the times are not used."""
 EMOTIONS = ".emotions.csv"
-KINDS: Mapping[str, Collection[str]] = {
+KINDS: dict[str, Collection[str]] = {
     "sound": AUDIO | VIDEO,
     "motion": MOTION,
     "phones": PHONES,

@@ -2,16 +2,16 @@
 
 Installed beside facesynth (`pip install ./examples/third_party`), it is known to every verb:
 
-    facesynth train loudness my_actor
-    facesynth speak loudness.safetensors speech.wav --liveliness 1.5 -o out.mp4
-    facesynth evaluate my_actor loudness -o report/
+    facesynth train loud_face my_actor
+    facesynth speak loud_face.safetensors speech.wav --liveliness 1.5 -o out.mp4
+    facesynth evaluate my_actor loud_face -o report/
 
 A package whose entry should be read without importing torch keeps CAPABILITIES in a module of its own.
 """
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -27,9 +27,9 @@ from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 
 CAPABILITIES = Capabilities(
-    "loudness",
+    "loud_face",
     "every channel follows the loudness of the voice",
-    home="facesynth_loudness",
+    home="facesynth_loud_face",
     options=(Option("liveliness", float, "Factor on the movement about the mean face; 1 as learned.", least=0, most=5),),
     hears_phones=False,
     minutes=0.2,
@@ -39,7 +39,7 @@ SILENT = 1e-4
 
 
 @register(CAPABILITIES)
-class Loudness(Method):
+class LoudFace(Method):
     """Linear regression of each channel on the loudness (dB) of the sound around a frame.
 
     `window_s` is the length of that sound, s.
@@ -66,12 +66,13 @@ class Loudness(Method):
         moved, heard = moved[whole], heard[whole]
         louder = heard - heard.mean()
         slope = louder @ (moved - moved.mean(axis=0)) / max(float(louder @ louder), 1e-12)
-        self.line = torch.from_numpy(np.stack([moved.mean(axis=0), slope])).float()
-        self.mean_db = torch.tensor([heard.mean()]).float()
+        self.line = torch.from_numpy(np.stack([moved.mean(axis=0), slope])).float().to(self.device)
+        self.mean_db = torch.tensor([heard.mean()]).float().to(self.device)
         return self.eval()
 
-    def synthesize(self, speech: Speech, *, seed: int = 0, liveliness: float = 1.0) -> Motion:
+    def synthesize(self, speech: Speech, *, seed: int = 0, liveliness: float = 1.0, **options: Any) -> Motion:
         """Motion as long as the phones; `liveliness` scales the movement about the mean face."""
+        self.refuse(options)
         layout, count = self.fitted_layout, int(speech.phones.frame_bounds(self.fps)[-1])
         mean, slope = self.line.cpu().numpy()
         louder = self.loudness_db(speech, count) - float(self.mean_db)
