@@ -10,15 +10,20 @@ from facesynth.inference.motion import Motion
 
 
 def head_cca(synthesised: Motion, truth: Motion) -> float:
-    """First canonical correlation of the two rotation vectors over time, 0..1; 0 where a head stands still.
+    """First canonical correlation of the two rotation vectors over time, 0..1; 0 where a head stands still."""
+    mine, yours = _rotations(synthesised, truth)
+    return canonical_correlation(mine, yours)
+
+
+def canonical_correlation(signal: Array, truth: Array) -> float:
+    """The largest of a signal [T, m] and a recorded one [T, n], 0..1; 0 where the first does not move.
 
     With orthonormal bases Q of both centred signals the canonical correlations are the singular
     values of Q_x^T Q_y.
     """
-    mine, yours = _rotations(synthesised, truth)
-    if len(mine) < 8:
+    if len(truth) < 8:
         raise UnavailableError("fewer than 8 frames with a head pose")
-    bases = [_orthonormal(signal - signal.mean(axis=0)) for signal in (mine, yours)]
+    bases = [_orthonormal(track - track.mean(axis=0)) for track in (signal, truth)]
     if not bases[1].shape[1]:
         raise UnavailableError("the recorded head stands still")
     if not bases[0].shape[1]:
@@ -28,9 +33,14 @@ def head_cca(synthesised: Motion, truth: Motion) -> float:
 
 def head_distance(synthesised: Motion, truth: Motion) -> float:
     """Mean over frames of the Euclidean distance of (yaw, pitch, roll) in degrees."""
+    return float(head_distances(synthesised, truth).mean())
+
+
+def head_distances(synthesised: Motion, truth: Motion) -> Array:
+    """[T'] the same of each frame."""
     angles = [Rotation.from_rotvec(signal).as_euler("YXZ", degrees=True) for signal in _rotations(synthesised, truth)]
     difference = (angles[0] - angles[1] + 180.0) % 360.0 - 180.0
-    return float(np.linalg.norm(difference, axis=1).mean())
+    return np.asarray(np.linalg.norm(difference, axis=1))
 
 
 def _rotations(synthesised: Motion, truth: Motion) -> tuple[Array, Array]:

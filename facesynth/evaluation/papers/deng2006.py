@@ -7,6 +7,7 @@ import numpy as np
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2006_eyes import eyes
+from facesynth.evaluation.papers.deng2006_head import head
 from facesynth.evaluation.papers.deng2006_speech import coarticulation, eigenspace
 from facesynth.evaluation.papers.deng2008 import PUBLISHED, database, times, trajectories
 from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented
@@ -19,14 +20,10 @@ PHONES = (14, 24, 33, 63)
 SECONDS = (137.67, 192.86, 371.50, 518.34)
 CHAPTERS = (
     ("maps", "figs 5.22 to 5.26", "phoneme Isomap maps beside PCA maps", "pictures"),
-    ("head", "fig. 4.5", "sample-based head motion: training error by number of neighbours", "a curve"),
-    ("head", "table 4.1", "head motion by HMM (K16 S3 M2 LR): Euler distance, CCA", "9.1°, 0.87"),
-    ("head", "§4.1", "31 audio features in 4 dimensions", "98.89 %"),
 )
 """Method, place, what, figure: of the dissertation's other chapters."""
 MISSING = {
     "maps": "maps of phonemes",
-    "head": "method for head motion",
 }
 """What a method is called where it does not exist."""
 
@@ -43,6 +40,7 @@ def findings(material: Material) -> list[Finding]:
         times(model, material, "table 5.2", PHONES, SECONDS, "2.66 GHz, 2006"),
         *trajectories(spoken, "figs 5.30, 5.31"),
         *eyes(material),
+        *head(material),
         *missing(),
     ]
 

@@ -1,0 +1,77 @@
+"""Train the head that comes with the package, on recordings of several people.
+
+python train/packaged_head.py CORPUS... [-o facesynth/stage/head.safetensors]
+
+Heads are brought to one rate, each recording to its own mean posture; long recordings are cut into parts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from facesynth.config import load_config
+from facesynth.corpus import Corpus, Utterance
+from facesynth.corpus.record import Record
+from facesynth.inference.layout import Layout
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
+from facesynth.methods.head_hmm.method import HeadHmmMethod
+from facesynth.methods.learn.heads import poses_of
+from facesynth.motion.resample import resample
+
+CONFIG = Path(__file__).parents[1] / "configs" / "head_hmm.yaml"
+TARGET = Path(__file__).parents[1] / "facesynth" / "stage" / "head.safetensors"
+FPS, PART_S = 30.0, 5.0
+LAYOUT = Layout("curves", ("still",))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = parse(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        # Everybody's heads, in one corpus.
+        people = [Corpus.open(path) for path in options.corpora]
+        name = ", ".join(person.performer for person in people)
+        together = Corpus.create(Path(folder) / "heads", performer=name, layout=LAYOUT, fps=FPS, emotions=("neutral",))
+        for number, person in enumerate(people):
+            for utterance in [person[i] for i in person.ids]:
+                add_parts(together, f"{number}_{utterance.id}", utterance)
+
+        # One model.
+        model = HeadHmmMethod.from_config(load_config(CONFIG)).fit(together)
+        model.provenance = {"sources": [person.provenance() for person in people]}
+        model.save(options.output)
+    print(f"{options.output}: {model.facts['recordings']} parts learned from, {options.output.stat().st_size / 1e3:.0f} kB")
+
+
+def add_parts(corpus: Corpus, name: str, utterance: Utterance) -> None:
+    """A recording in parts, about its own mean posture."""
+    motion, speech = utterance.motion, utterance.speech
+    if motion.head is None or not np.isfinite(motion.head).all():
+        return
+    head = poses_of(utterance) - poses_of(utterance).mean(axis=0)
+    alone = resample(Motion(np.zeros((len(motion), 1), np.float32), motion.fps, LAYOUT, head.astype(np.float32)), FPS)
+    count = max(1, round(alone.duration_s / PART_S))
+    for number, frames in enumerate(np.array_split(np.arange(len(alone)), count)):
+        start_s, stop_s = frames[0] / FPS, (frames[-1] + 1) / FPS
+        sound = speech.audio[round(start_s * speech.sample_rate) : round(stop_s * speech.sample_rate)]
+        lasts = len(frames) / FPS
+        said = Speech(sound, speech.sample_rate, PhoneTrack(("pau",), np.array([lasts])), EmotionTrack.constant("neutral", lasts))
+        assert alone.head is not None  # noqa: S101 - it was given one
+        part = replace(alone, frames=alone.frames[frames], head=alone.head[frames])
+        corpus.add_utterance(Record(f"{name}_{number}", "", f"{name}_{number}", "neutral"), said, part)
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("corpora", type=Path, nargs="+", metavar="CORPUS")
+    parser.add_argument("-o", "--output", type=Path, default=TARGET)
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    main()
