@@ -32,7 +32,6 @@ from facesynth.methods.learn.heads import mean_head, poses_of, sound_windows, wi
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.registry import create
 from facesynth.motion.sway import quiet_head
-from facesynth.stage.performance import loudness
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAYOUT = Layout("curves", ("still",))
@@ -130,6 +129,15 @@ def sway(_: Corpus, train: list[Utterance]) -> Maker:
         return rest + quiet_head(len(u.motion), u.motion.fps, loudness(u.speech, u.motion), seed_of(u))
 
     return make
+
+
+def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
+    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
+    window = max(int(0.03 * speech.sample_rate), 1)
+    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
+    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
+    level = np.sqrt(power[at])
+    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)
 
 
 def still(_: Corpus, train: list[Utterance]) -> Maker:

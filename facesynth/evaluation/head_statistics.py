@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 from scipy.stats import ks_2samp
@@ -53,7 +54,7 @@ def take_apart(motion: Motion, speech: Speech) -> HeadSample:
     return HeadSample(speed[~pause], speed[pause], np.ptp(smooth, axis=0), _band_power(velocity, motion.fps))
 
 
-def pauses(speech: Speech, fps: float, count: int) -> Array:
+def pauses(speech: Speech, fps: float, count: int) -> NDArray[np.bool_]:
     """[count] frames in which nothing is said."""
     audio = resample(speech.audio, speech.sample_rate, RATE)
     level = np.sqrt(np.square(pitch_windows(fps).cut(audio, 0, 0, count).astype(np.float64)).mean(axis=1))

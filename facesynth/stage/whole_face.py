@@ -18,10 +18,11 @@ from facesynth.methods.capabilities import Accounting, Looking
 from facesynth.methods.method import Method
 from facesynth.methods.registry import ask, load
 from facesynth.motion.resample import resample
-from facesynth.motion.sway import quiet_head
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import Request
 
+PACKAGED_HEAD = Path(__file__).with_name("head.safetensors")
+"""Comes with the package; head.md beside it says from whom it learned."""
 PACKAGED_EYES = Path(__file__).with_name("eyes.safetensors")
 """Comes with the package; the README beside it says from whom it learned."""
 
@@ -63,8 +64,8 @@ def _with_head(cast: Cast, motion: Motion, speech: Speech, request: Request) -> 
         return replace(motion, head=scaled(motion.head, request.head.gain)), "as the mouth's model recorded it"
     if request.head.source == "recorded":
         return motion, "still: none was recorded"
-    swaying = quiet_head(len(motion), motion.fps, loudness(speech, motion), request.seed)
-    return replace(motion, head=scaled(swaying, request.head.gain)), "sway and nods by constants"
+    head = at_clock(_packaged_head().synthesize(speech, seed=request.seed), motion).head if len(motion) else None
+    return replace(motion, head=scaled(head, request.head.gain)), "from the sound, as other people's of the package"
 
 
 def _with_eyes(cast: Cast, motion: Motion, speech: Speech, request: Request) -> tuple[Motion, EyeMotion, str]:
@@ -111,6 +112,11 @@ def _packaged() -> Looking:
     return model
 
 
+@cache
+def _packaged_head() -> Method:
+    return load(PACKAGED_HEAD)
+
+
 def scaled(head: NDArray[np.float32] | None, gain: float) -> NDArray[np.float32] | None:
     """A head [T, 6] that turns and shifts by a factor."""
     return None if head is None else (gain * head).astype(np.float32)
@@ -123,12 +129,3 @@ def at_clock(part: Motion, motion: Motion) -> Motion:
     at = np.minimum(np.arange(len(motion)), len(there) - 1)
     head, eyes = (None if value is None else value[at] for value in (there.head, there.eyes))
     return replace(there, frames=there.frames[at], head=head, eyes=eyes)
-
-
-def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
-    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
-    window = max(int(0.03 * speech.sample_rate), 1)
-    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
-    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
-    level = np.sqrt(power[at])
-    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)

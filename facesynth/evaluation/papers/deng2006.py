@@ -18,9 +18,7 @@ from facesynth.motion.pca import Pca
 
 PHONES = (14, 24, 33, 63)
 SECONDS = (137.67, 192.86, 371.50, 518.34)
-CHAPTERS = (
-    ("maps", "figs 5.22 to 5.26", "phoneme Isomap maps beside PCA maps", "pictures"),
-)
+CHAPTERS = (("maps", "figs 5.22 to 5.26", "phoneme Isomap maps beside PCA maps", "pictures"),)
 """Method, place, what, figure: of the dissertation's other chapters."""
 MISSING = {
     "maps": "maps of phonemes",

@@ -65,11 +65,14 @@ def neighbours(material: Material, train: list[Utterance]) -> list[Finding]:
     what = "smallest total evaluation error by number of neighbours, a frame, in squared standard deviations"
     best = NEIGHBOURS[int(np.argmin(errors))]
     curve = ", ".join(f"{k}: {error:.2f}" for k, error in zip(NEIGHBOURS, errors, strict=True))
+    ours = f"least at {best} ({curve})"
     seven = found[7].weights[[2, 0, 1]]
     return [
         Finding("§4.1", "31 features in 4 dimensions", "98.89 %", f"{model.facts['variance_share']:.2%}", False, material.unlike),
-        Finding("fig. 4.4", "weights Wa, Wn, Wr with K = 7", "0.318 / 0.158 / 0.525", values(seven), False, material.unlike),
-        Finding("fig. 4.5", what, "least at 7", f"least at {best} ({curve})", False, material.unlike, figure=error_figure(errors)),
+        Finding(
+            "fig. 4.4", "weights Wa, Wn, Wr with K = 7", "0.318 / 0.158 / 0.525", values(seven.tolist()), False, material.unlike
+        ),
+        Finding("fig. 4.5", what, "least at 7", ours, False, material.unlike, figure=error_figure(errors)),
     ]
 
 
@@ -113,14 +116,14 @@ def _row(material: Material, test: list[Utterance], config: Mapping[str, Any], p
     for utterance in test:
         made = model.synthesize(utterance.speech, seed=material.seed).head
         assert made is not None  # noqa: S101 - it moves the head
-        made = made[np.minimum(np.arange(len(utterance.motion)), len(made) - 1)]
-        off.append(_off(made, utterance.motion))
-        cca.append(head_cca(_with(utterance.motion, made), _with(utterance.motion, poses_of(utterance))))
+        poses = made.astype(np.float64)[np.minimum(np.arange(len(utterance.motion)), len(made) - 1)]
+        off.append(_off(poses, utterance.motion))
+        cca.append(head_cca(_with(utterance.motion, poses), _with(utterance.motion, poses_of(utterance))))
     all_off = np.concatenate(off)
     kind = "EG" if config.get("ergodic") else "LR"
     size = f"K={config['clusters']} S={config['states']} M={config['mixtures']} {kind}"
     what = f"HMM {size}: Euler distance (mean, std, °), CCA (mean, std)"
-    ours = values([all_off.mean(), all_off.std(), np.mean(cca), np.std(cca)])
+    ours = values([float(x) for x in (all_off.mean(), all_off.std(), np.mean(cca), np.std(cca))])
     return Finding("table 4.1", what, paper, ours, False, material.unlike)
 
 
