@@ -115,7 +115,7 @@ def test_a_corrected_textgrid_stays(tmp_path, model):
         (("--emotion", "happy", "--emotions", "e.csv"), "give one"),
         (("--emotions", "e.csv", "--intensity", "0.2"), "of its own"),
         (("--emotion", "bored"), "unknown emotion"),
-        (("--head", "inf"), "off or a factor"),
+        (("--head", "inf"), "wanted off, recorded, a factor"),
         (("--seed", "-1"), "seed"),
     ],
 )

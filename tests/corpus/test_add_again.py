@@ -36,7 +36,7 @@ def aligner(monkeypatch):
         end_s = len(audio) / rate
         return Placed(PhoneTrack(("pau", "aa", "pau"), np.array([0.01 * len(text), end_s - 0.1, end_s])))
 
-    monkeypatch.setattr("facesynth.speech.alignment.align", place)
+    monkeypatch.setattr("facesynth.speech.phone_sources.align", place)
     return calls
 
 
@@ -231,7 +231,7 @@ def test_a_change_that_was_interrupted_is_done_by_the_next_run(session, tmp_path
     with pytest.raises(KeyboardInterrupt):
         add(corpus, [session])
     monkeypatch.undo()
-    monkeypatch.setattr("facesynth.speech.alignment.align", _placed)
+    monkeypatch.setattr("facesynth.speech.phone_sources.align", _placed)
     add(Corpus.open(corpus.path), [session])
     assert same_as_anew(corpus, session, tmp_path / "d")
 

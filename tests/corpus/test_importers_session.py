@@ -146,7 +146,8 @@ def test_one_odd_file_that_sorts_first_does_not_set_the_layout(tmp_path):
 
 def test_axes_that_the_names_tell_are_found_and_kept_with_the_corpus(tmp_path):
     mocap(tmp_path / "session", turn=lambda points: points[..., [0, 2, 1]] * [1, -1, 1])
-    done = run("corpus", "add", tmp_path / "actor", tmp_path / "session" / "t1.c3d", tmp_path / "session" / "t1.wav", "--jobs", 1)
+    one = sorted((tmp_path / "session").glob("t1.*"))
+    done = run("corpus", "add", tmp_path / "actor", *one, "--jobs", 1)
     assert done.exit_code == 0, done.output
     assert "axes taken as x,z,-y" in done.output
     assert "x,z,-y" in (tmp_path / "actor" / "recordings.yaml").read_text(encoding="utf-8")
