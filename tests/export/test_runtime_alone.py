@@ -158,7 +158,7 @@ def test_what_the_command_line_refuses(folders, tmp_path, capsys, exported, lds_
     wrong = [
         (riff(cut=501), [lds, *out], "is truncated"),
         (riff()[:40], [lds, *out], "truncated"),
-        (riff()[:20], [lds, *out], "no part|truncated"),
+        (riff()[:20], [lds, *out], "damaged header"),
         (b"", [lds, *out], "no WAV file"),
         (riff(samples=0), [lds, *out], "holds no samples"),
         (riff(bits=8), [lds, *out], "has 8 bits a sample"),
