@@ -27,7 +27,7 @@ def test_the_distortion_of_a_codebook_never_rises(size):
 
 def test_a_codebook_finds_heaps_and_stops_where_all_points_are_alike():
     heaps = np.array([[0, 0], [10, 0], [0, 10], [10, 10.0]])
-    cells = codebook(np.repeat(heaps, 50, axis=0) + 0.1 * RNG.standard_normal((200, 2)), 4)
+    cells = codebook(np.repeat(heaps, 50, axis=0) + 0.1 * np.random.default_rng(0).standard_normal((200, 2)), 4)
     assert {tuple(np.round(mean / 10) * 10) for mean in cells.means} == {tuple(heap) for heap in heaps}
     assert len(codebook(np.ones((20, 2)), 8).means) == 1
 
