@@ -9,12 +9,11 @@ from facesynth.capture.clock import clock_between
 from facesynth.speech.audio import load_audio, read_sound
 
 
-@pytest.mark.parametrize("suffix", sorted(CONTAINERS))
-@pytest.mark.parametrize("fps", [30, 60])
+@pytest.mark.parametrize(
+    ("suffix", "fps"), [(s, fps) for s in sorted(CONTAINERS) for fps in (30, 60) if s != "avi" or fps == 30]
+)  # the generator writes AVI at 30 fps
 def test_heard_and_seen_closures_agree_in_every_container(tmp_path, suffix, fps):
     clip = Clip(pictures_s=at_30_fps(2.0) if fps == 30 else tuple(np.arange(120) / 60))
-    if suffix == "avi" and fps != 30:
-        pytest.skip("the generator writes AVI at 30 fps")
     assert largest_error_s(write(tmp_path / f"a.{suffix}", clip), clip) < 0.02
 
 
