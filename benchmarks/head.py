@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from head_sway import quiet_head
 from numpy.typing import NDArray
 
 from facesynth.config import load_config
@@ -31,7 +32,6 @@ from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.learn.heads import mean_head, poses_of, sound_windows, with_head
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.registry import create
-from facesynth.motion.sway import quiet_head
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAYOUT = Layout("curves", ("still",))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
 
-SEPARATORS = ",;\t"
 _COMMA_NUMBER = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
 _LONGEST_QUOTE = 60
 _LOOKED_AT = 50

@@ -71,11 +71,6 @@ def corpus_from_points(folder: Path, paths: Iterable[str | Path], header: Mappin
     return Corpus.create(folder, layout=tracked_layout(reference.lower), fps=clips[0].fps, **{**notes, **header})
 
 
-def has_points(folder: Path) -> bool:
-    """Whether a corpus is one of followed points."""
-    return (folder / POINTS).is_file()
-
-
 def motion_from_points(folder: Path, video: Path, sound: Path, fps: float) -> tuple[Motion, tuple[str, ...]]:
     """The points of a video, at the rate of the corpus in `folder`, and what was noticed."""
     shapes, following, resampled = kept_shapes(video, Reference.load(folder / POINTS))
