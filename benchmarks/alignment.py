@@ -5,8 +5,6 @@ eight emotions). Printed are errors of boundaries, phone errors of recognition, 
 refused and a wrong one accepted.
 """
 
-from __future__ import annotations
-
 import argparse
 import difflib
 from collections.abc import Callable, Sequence

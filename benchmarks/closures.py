@@ -5,8 +5,6 @@ learned from: its recorded lip gaps at p, b, m give the threshold (see `facesynt
 evenly from all. Printed are shares over all p, b, m and all open vowels of a set, and how many of them there were.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 python benchmarks/containers.py
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

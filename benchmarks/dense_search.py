@@ -3,8 +3,6 @@
 The matrix takes Θ(N²) memory; it is made in one batch for each length of a phone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

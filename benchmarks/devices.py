@@ -6,8 +6,6 @@ Each task is run once to warm up and then as often as fits into a second; the cl
 Where there is no accelerator, the processor's times stand alone, and this is said.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import time

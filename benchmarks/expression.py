@@ -6,8 +6,6 @@ The mouth is eFASE in neutral at the timing of the recorded emotional sentence. 
 difference of the emotion, an expression grown from patches, or the emotion map by radial basis functions of the anime graph.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import replace

@@ -3,8 +3,6 @@
 python benchmarks/face_sheet.py folder/
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A head that is alive: slow sway, and small nods where the voice is loud."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d

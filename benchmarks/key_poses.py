@@ -6,8 +6,6 @@ Weights are solved from every second utterance, posed, and learned from as many 
 utterances are unseen. Least squares knows the shapes of the head, key poses do not.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 python benchmarks/lds.py CORPUS -o report/ [--folds 5] [--limit 60]
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The corpus must have groups of its own, such as the built-in performer's: its ma
 put back, and what is told from twelve recordings at a time is compared with the corpus' groups.
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -6,8 +6,6 @@ with repeats merged; closures are p, b, m whose middles lie within 60 ms of each
 processor time over the sound's length, on one thread.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable, Iterator

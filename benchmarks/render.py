@@ -6,8 +6,6 @@ The reference, measured in the same run, is one depth map of the same mesh at th
 per pixel, one thread, no colour. A frame has four samples per pixel, shadow, skin, eyes and hair.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable

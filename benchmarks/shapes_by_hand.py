@@ -7,8 +7,6 @@ p, b and m (open vowels) at which the lips are shut: within the share of a face'
 talker's p, b and m stay in.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -5,8 +5,6 @@ of STRANGERS, a corpus of somebody else in the same layout. Printed are correlat
 speaker's own lips, over all frames of a set, and for the same speaker the mean distance of markers.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -6,8 +6,6 @@ The warp draws where each pixel is read from, which kornia then reads. `displace
 how far each pixel is moved, makes the grid of places from that, and reads it by `grid_sample`.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 

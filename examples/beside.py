@@ -7,8 +7,6 @@ Learns from every other utterance of the corpus, speaks the sound of this one, a
 recorded one on the right.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

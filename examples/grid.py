@@ -8,8 +8,6 @@ the corpus and runs the one command that a performer of your own would need as w
     facesynth corpus add actor/ clips/*.mpg --text-file lines.csv
 """
 
-from __future__ import annotations
-
 import csv
 import subprocess
 import sys

@@ -6,8 +6,6 @@
 that was learned from. Writes `beside.mp4` (real left, head right, with the sound) and `plate.png`. `walk.py` does this as well.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

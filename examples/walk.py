@@ -8,8 +8,6 @@ sentences; with a folder of your own clips, write `lines.csv` (`id,text`) into i
 prints the command that a person would type. Needs `pip install 'facesynth[demo,capture]'` and, once, `facesynth fetch landmarks`.
 """
 
-from __future__ import annotations
-
 import csv
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Writing files so that a reader finds the old one or the new one, never a part of it."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator

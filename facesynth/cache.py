@@ -1,7 +1,5 @@
 """Where facesynth keeps what it made or fetched and can make or fetch again."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

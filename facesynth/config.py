@@ -1,7 +1,5 @@
 """Method settings from YAML files and from `key=value` on the command line."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Where tensors live: the processor, or an accelerator beside it."""
 
-from __future__ import annotations
-
 import torch
 
 from facesynth.inference.errors import FacesynthError, unknown

@@ -1,7 +1,5 @@
 """Text of files whose encoding nobody states."""
 
-from __future__ import annotations
-
 _LOWER = frozenset("àáâãäåæçèéêëìíîïñòóôõöøùúûüýÿßœ")
 _UPPER = frozenset("ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜŸŒ")
 

@@ -1,7 +1,5 @@
 """Progress: one way of showing it, on standard error; a bar for who watches, a line now and then for a log."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sized

@@ -1,7 +1,5 @@
 """A talker whose head goes down when the voice is loud and to the left when it is high: head motion whose answer is known."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

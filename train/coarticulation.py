@@ -6,8 +6,6 @@ With --common FILE nothing is trained: the polynomials of all pairs of phones of
 made by hand are blended.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

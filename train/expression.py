@@ -3,8 +3,6 @@
 python train/expression.py CORPUS [--config configs/expression.yaml] [-o expression.safetensors] [--seed 0]
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path

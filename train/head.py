@@ -3,8 +3,6 @@
 python train/head.py CORPUS [--method head_hmm] [--config configs/head_hmm.yaml] [-o head.safetensors] [--seed 0]
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path

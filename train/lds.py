@@ -3,8 +3,6 @@
 python train/lds.py CORPUS [--config configs/lds.yaml] [-o lds.safetensors] [--seed 0] [--plots folder/]
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -5,8 +5,6 @@ python train/packaged_head.py CORPUS... [-o facesynth/stage/head.safetensors]
 Heads are brought to one rate, each recording to its own mean posture; long recordings are cut into parts.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Fill site/ for the page: python make_site.py lds.safetensors speech.wav [site]. Then: npm install && npm run build."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -9,8 +9,6 @@ Installed beside facesynth (`pip install ./examples/third_party`), it is known t
 A package whose entry should be read without importing torch keeps CAPABILITIES in a module of its own.
 """
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np

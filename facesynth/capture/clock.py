@@ -1,7 +1,5 @@
 """Sound that was recorded apart from the video: how its clock lies against the camera's, and the motion on that clock."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +72,7 @@ class Recorder:
     """How its loudness rises and falls."""
 
     @classmethod
-    def of(cls, audio: NDArray[np.float32], sample_rate: int) -> Recorder:
+    def of(cls, audio: NDArray[np.float32], sample_rate: int) -> "Recorder":
         """A recorder's sound, ready to be searched."""
         return cls(audio, sample_rate, _envelope(audio, sample_rate))
 

@@ -1,7 +1,5 @@
 """Where the faces are in a picture (BlazeFace: Bazarevsky and others 2019, arXiv 1907.05047)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Blinks and gaze of a tracked face: how far the lids are open, and where the irises lie between the corners."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter

@@ -1,7 +1,5 @@
 """Tracks kept in the user's cache: following a face is by far the slowest step, and depends on the video alone."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

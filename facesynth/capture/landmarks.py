@@ -1,7 +1,5 @@
 """The 468 points of the face mesh as a layout: which are the lips, the lids, the brows, and which stand still on the skull."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The motion of a face that was followed in a video, in the layout of its performer."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.capture.eyes import eyes_of

@@ -4,8 +4,6 @@ A camera far from a face sees it nearly in parallel rays: picture and face diffe
 factor (weak perspective), and the mesh gives depth on the picture's own scale.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

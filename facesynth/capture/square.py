@@ -1,7 +1,5 @@
 """A tilted square in a picture: what a network looks at, and the way back from its coordinates to the picture's."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

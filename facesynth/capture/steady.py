@@ -3,8 +3,6 @@
 A zero-phase low-pass (Butterworth, run forwards and backwards). Its cut-off is measured, not guessed: see `CUTOFF_HZ`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt

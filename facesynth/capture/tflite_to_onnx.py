@@ -4,8 +4,6 @@ TensorFlow Lite keeps images as [1, H, W, channels], ONNX as [1, channels, H, W]
 reshaping every activation is kept the second way.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What is seen of a face in a video: its points in every frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

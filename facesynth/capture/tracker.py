@@ -4,8 +4,6 @@ Face mesh: Kartynnik and others 2019, arXiv 1907.06724; iris: Ablavatski and oth
 looked for where it was in the picture before; only where it is lost is the whole picture searched.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

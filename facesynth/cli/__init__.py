@@ -1,7 +1,5 @@
 """The command line: `facesynth VERB …`. Verbs are imported when they are called, so that --help starts at once."""
 
-from __future__ import annotations
-
 import importlib
 import signal
 import sys

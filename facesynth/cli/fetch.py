@@ -1,7 +1,5 @@
 """`facesynth fetch`: what is too large or too foreign to come with the package, downloaded when asked."""
 
-from __future__ import annotations
-
 import json
 
 import click

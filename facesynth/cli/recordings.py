@@ -1,7 +1,5 @@
 """Files of sound that a command is given, one by one or as folders."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

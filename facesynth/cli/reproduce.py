@@ -1,7 +1,5 @@
 """`facesynth reproduce`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

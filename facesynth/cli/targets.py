@@ -1,7 +1,5 @@
 """Where `speak` writes, and what it must not write over."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A performer's recordings on disk."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -179,16 +177,16 @@ class Corpus:
         """Length of an utterance's sound, seconds."""
         return duration_s(self.files, self.record(utterance_id).id)
 
-    def subset(self, ids: Iterable[str]) -> Corpus:
+    def subset(self, ids: Iterable[str]) -> "Corpus":
         """A view of some utterances."""
         return Corpus(self.path, self.header, {utterance_id: self.record(utterance_id) for utterance_id in ids})
 
-    def split(self, seed: int = 0, test_share: float = 0.2) -> tuple[Corpus, Corpus]:
+    def split(self, seed: int = 0, test_share: float = 0.2) -> "tuple[Corpus, Corpus]":
         """Views to train on and to test on, by sentence; the `split` column wins where it is filled."""
         train, test = split_ids(self.usable_records, seed, test_share)
         return self.subset(train), self.subset(test)
 
-    def folds(self, k: int, seed: int = 0) -> list[tuple[Corpus, Corpus]]:
+    def folds(self, k: int, seed: int = 0) -> "list[tuple[Corpus, Corpus]]":
         """Pairs (k of them) of views to train on and to test on, by sentence; every sentence is tested on once."""
         return [(self.subset(train), self.subset(test)) for train, test in fold_ids(self.usable_records, k, seed)]
 

@@ -1,7 +1,5 @@
 """Which sentences would add most to a corpus: those with pairs of phones that it has never, or hardly ever, recorded."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

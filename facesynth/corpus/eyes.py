@@ -1,7 +1,5 @@
 """How often and how long a performer blinks, and how far the eyes wander: also from recordings without sound."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass

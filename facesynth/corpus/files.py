@@ -3,8 +3,6 @@
 A corpus may come from a stranger: an id must never lead out of the corpus' folder, on any system.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from dataclasses import dataclass

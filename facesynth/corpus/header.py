@@ -1,7 +1,5 @@
 """corpus.yaml: what holds for every utterance of a corpus."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ A node is one phone of one utterance, called `utterance_id:phone_number`, counte
 track. Added nodes are called `+:number`, which no utterance can be called.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Motion as other programs write it: NPZ and CSV, of any rate, with or without the head's motion in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The arrays of one recording's motion."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

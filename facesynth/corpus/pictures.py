@@ -1,7 +1,5 @@
 """A picture of a recording: its waveform, its words and phones, and how far the mouth is open."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a saved model states of the recordings that it learned from."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """One line of utterances.csv: what is known of an utterance beside its signals."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Mapping
@@ -109,7 +107,7 @@ def write_records(path: Path, records: Iterable[Record]) -> None:
     write_text(path, text.getvalue())
 
 
-def _parsed(reader: csv.DictReader[str]) -> tuple[dict[str, Record], list[str]]:
+def _parsed(reader: "csv.DictReader[str]") -> tuple[dict[str, Record], list[str]]:
     columns = reader.fieldnames or ()
     faults = [f", line 1: {unknown('column', column, COLUMNS)}" for column in columns if column not in COLUMNS]
     if "id" not in columns:

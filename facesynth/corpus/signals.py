@@ -1,7 +1,5 @@
 """Sound, phones, emotions and motion of one utterance: from its files and into them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Collection, Sequence
 from pathlib import Path

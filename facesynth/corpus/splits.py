@@ -1,7 +1,5 @@
 """Splits by sentence: what is tested on was never heard in training, in no emotion and no take."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Speech with the motion that was recorded with it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from facesynth.inference.motion import Motion

@@ -1,7 +1,5 @@
 """The same work on many things: in this process, in several, or on a Ray cluster, with the same results in order."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import sys

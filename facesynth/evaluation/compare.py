@@ -1,7 +1,5 @@
 """Judging methods side by side: the same sentences to learn from, the same to be tested on, the same figures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

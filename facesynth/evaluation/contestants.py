@@ -1,7 +1,5 @@
 """Who is compared: a method with its settings, by name, by a settings file, or a family of variants from one file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

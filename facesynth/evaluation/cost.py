@@ -1,7 +1,5 @@
 """What a method costs: time by the clock and of the processor, and memory."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

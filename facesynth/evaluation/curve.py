@@ -6,8 +6,6 @@ of points (`energy_ratio`, `lve`) that a method reaches over its settings, each 
 utterance's mean pose, which no method needs to be asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal

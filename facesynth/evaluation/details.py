@@ -1,7 +1,5 @@
 """Where the error of a method lies: at which phones, on which points, how it is spread, and what it trades for movement."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise

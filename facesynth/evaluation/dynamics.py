@@ -1,7 +1,5 @@
 """How much and how smoothly a synthesised face moves, beside how far it is off. `u`: mm, px or weight."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A comparison as files for programs and for papers."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """How close synthesised eyes are to recorded ones: distances between distributions, since no blink is at its recorded time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

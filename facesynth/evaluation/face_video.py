@@ -1,7 +1,5 @@
 """Truth and methods side by side, with the sound, small enough to lie inside a page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Which sentences are learned from and which are tested on: said once, kept in a file, the same for every method."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How far synthesised points are from recorded ones. `u` is the unit of the layout: mm, px or weight."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.evaluation.pair import Array, UnavailableError, distances, mean_present, paired_points

@@ -1,7 +1,5 @@
 """How close synthesised head rotation is to the recorded one (Deng 2006 table 4.1)."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

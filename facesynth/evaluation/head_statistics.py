@@ -1,7 +1,5 @@
 """How a head moves, as distributions: a head may be unlike the recorded one at every moment and still move like a person's."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """One method on one fold: train, speak the tested sentences, keep what came out. Killed at any moment, it goes on there."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """What judges the motion of one method: the recordings, and figures utterance by utterance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self

@@ -1,7 +1,5 @@
 """The metrics by name: what each is measured in, which way is better, and the function that defines it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """What two motions must share before one is judged by the other, and the differences between them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which methods can be told apart: paired differences, bootstrapped over sentences, corrected for how many are looked at."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """A face drawn from its points alone: any layout has one, whoever recorded it. Curves are drawn as bars."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

@@ -16,8 +16,6 @@ the processor), `joins` (first frames of the pieces of a concatenative method) a
 of itself). Other motions of a method that draws them lie in `METHOD/samples/NUMBER/ID.npz`, in the same form.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field

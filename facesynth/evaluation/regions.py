@@ -1,7 +1,5 @@
 """Which points of a layout are the lips and which the upper face: said once, for every metric."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The report: one page for a browser that needs no network, and the same as files."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A second recording of the same words and emotion: how near one performer comes to himself."""
 
-from __future__ import annotations
-
 from difflib import SequenceMatcher
 
 import numpy as np

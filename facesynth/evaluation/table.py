@@ -1,7 +1,5 @@
 """What came out of a comparison, as a table for people and as files for programs."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -101,7 +99,7 @@ class Comparison:
         silent = ~np.any([one for seen in present.values() for one in seen], axis=0)
         return {name: int((np.any(seen, axis=0) | silent).sum()) for name, seen in present.items()}
 
-    def of_emotion(self, emotion: str) -> Comparison:
+    def of_emotion(self, emotion: str) -> "Comparison":
         """The same methods on the utterances of one emotion; figures of the whole run are left out."""
         chosen = [i for i, one in enumerate(self.emotions) if one == emotion]
         rows = tuple(

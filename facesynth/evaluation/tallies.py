@@ -1,7 +1,5 @@
 """Judging all stored predictions of one method."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

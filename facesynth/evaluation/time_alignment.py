@@ -1,7 +1,5 @@
 """Matching the frames of two motions in time, so that what is late is not taken for what is wrong."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

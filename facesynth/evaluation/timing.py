@@ -1,7 +1,5 @@
 """Whether the mouth moves when the recorded one did, not only as it did."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks

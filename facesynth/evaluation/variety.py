@@ -1,7 +1,5 @@
 """How different the samples of a stochastic method are, and how good their mean and their best are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """Whether each method is worth more than the mean face, and where its error lies: computed, so that nobody need believe."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

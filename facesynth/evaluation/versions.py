@@ -1,7 +1,5 @@
 """What a figure was computed with: packages, system, and the source of facesynth itself."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 from functools import cache

@@ -1,7 +1,5 @@
 """The anime graph as graphs and arrays: what it hears, components, emotion maps, the path search, and the recorded nodes."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, fields
 from typing import Any
 

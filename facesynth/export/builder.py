@@ -4,8 +4,6 @@ The modules that are exported are short, and a graph that is written down has no
 onnxruntime lacks (its convolutions and some transforms know no float64), and is the same in every version of torch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

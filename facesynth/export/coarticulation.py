@@ -1,7 +1,5 @@
 """Co-articulation as a graph and arrays: displacements to motion, key shapes, and the polynomials that blend them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.export.folder import Content

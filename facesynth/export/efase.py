@@ -1,7 +1,5 @@
 """eFASE as graphs and arrays: components, the path search over given candidates, and the database for the runtime."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any

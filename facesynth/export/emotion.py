@@ -1,7 +1,5 @@
 """The emotion detector as graphs: the front end of its features, and the machine with its probabilities."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

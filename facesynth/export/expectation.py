@@ -1,7 +1,5 @@
 """What a soft model expects to hear and see: the small network behind `pose_weight`, and the sounds of recorded phones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

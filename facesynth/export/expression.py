@@ -1,7 +1,5 @@
 """Expressions as a graph and arrays: signals to motion, and the recorded signals that new ones are grown from."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import numpy as np

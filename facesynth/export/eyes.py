@@ -1,7 +1,5 @@
 """Eyes as arrays: patches that numpy grows. Nothing in them is a graph."""
 
-from __future__ import annotations
-
 from facesynth.export.folder import Content
 from facesynth.methods.eyes.method import Eyes
 

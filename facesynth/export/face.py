@@ -1,7 +1,5 @@
 """Markers to the vertices of the head, as graphs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

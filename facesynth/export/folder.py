@@ -1,7 +1,5 @@
 """Writing an exported folder: graphs, arrays, manifest."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

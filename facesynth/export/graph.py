@@ -1,7 +1,5 @@
 """What is exported: a graph with named, measured ports, and the code that it must agree with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

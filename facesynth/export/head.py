@@ -1,7 +1,5 @@
 """Methods of the head as graphs and arrays: sound's features to components, prosody to the likelihood of states."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.export.builder import Builder

@@ -1,7 +1,5 @@
 """Markers to the channels of any head, learned from key poses, as a graph."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

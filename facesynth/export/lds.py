@@ -1,7 +1,5 @@
 """The linear dynamical system as graphs: sound to features, uniform numbers to innovations, both to frames."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which models can be exported, and how a model file becomes a folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

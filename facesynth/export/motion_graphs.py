@@ -1,7 +1,5 @@
 """Linear maps of motion: principal and independent components; and the maps between emotions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Folders of graphs without a trained model: what is heard in a sound, and what moves the built-in head."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

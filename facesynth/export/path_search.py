@@ -1,7 +1,5 @@
 """The cheapest path over given candidates as one graph: a scan forth that keeps where each came from, a scan back."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The phone network as a graph and as a folder that hears phones without torch."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

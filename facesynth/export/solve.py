@@ -5,8 +5,6 @@ method ends in the same weights: here accelerated projected gradients on all fra
 the shapes have length 1, until no weight moves.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The audio features as graphs. All take sound that is already at their rate; sums are in float64 where logarithms follow."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The piecewise-affine warp as a graph: triangle by triangle, then one bilinear look-up for each pixel."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

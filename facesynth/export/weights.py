@@ -1,7 +1,5 @@
 """Smaller folders: large constants kept in 16 or 8 bits. They are widened when they are used; nothing is computed in them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Literal, get_args
 

@@ -1,7 +1,5 @@
 """What a face does over time: weights of its shapes, the head, the gaze and the tongue, at one rate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -83,7 +81,7 @@ class FaceAnimation:
         """[T, len(names)] weights in another rig's order of shapes."""
         return np.stack([self.weight(name) for name in names], axis=1)
 
-    def resampled(self, fps: float) -> FaceAnimation:
+    def resampled(self, fps: float) -> "FaceAnimation":
         """The same movement at another rate; 23.976 and 29.97 are fine.
 
         Monotone cubic interpolation, which never leaves the range of its neighbours, so that weights
@@ -113,7 +111,7 @@ class FaceAnimation:
             residual_mm=None if self.residual_mm is None else curve(self.residual_mm),
         )
 
-    def _stretched(self, fps: float) -> FaceAnimation:
+    def _stretched(self, fps: float) -> "FaceAnimation":
         """One frame, held."""
         many = np.zeros(max(1, round(self.duration_s * fps)), np.int64)
         residual = None if self.residual_mm is None else self.residual_mm[many]

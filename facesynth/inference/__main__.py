@@ -1,7 +1,5 @@
 """`facesynth-runtime FOLDER SOUND.wav …`: motion, an emotion or phones, from the command line."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

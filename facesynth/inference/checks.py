@@ -1,7 +1,5 @@
 """Sound, rates and seeds as strangers give them: refused where they cannot be meant."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -4,8 +4,6 @@
 and `keep_shut` holds on to closures while the rest of the face changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

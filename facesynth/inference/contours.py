@@ -1,7 +1,5 @@
 """What a voice does over time: timbre, loudness, pitch and colour, a hundred times a second."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Sound heard by the phone network in overlapping windows: the same answer for the whole and for pieces of any size."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -39,7 +37,7 @@ class Reach:
     """Frames of the window after them."""
 
     @classmethod
-    def seconds(cls, block_s: float, before_s: float, ahead_s: float) -> Reach:
+    def seconds(cls, block_s: float, before_s: float, ahead_s: float) -> "Reach":
         """Of lengths in seconds, to the next frame; FacesynthError where a block has no frame or a length is negative."""
         block, before, ahead = (round(length * FRAMES_PER_S) for length in (block_s, before_s, ahead_s))
         if block < 1 or before < 1 or ahead < 0:
@@ -111,7 +109,7 @@ class Ear:
         found = list(self._blocks(state, ended))
         return [block.log_probabilities for block in found], found[-1].after if found else state
 
-    def _blocks(self, state: EarState, ended: bool) -> Iterator[_Block]:
+    def _blocks(self, state: EarState, ended: bool) -> "Iterator[_Block]":
         """All blocks whose windows lie within the sound that is known; at its end the last windows are shorter."""
         reach, total = self.reach, state.samples
         count = total // STEP + 1
@@ -123,7 +121,7 @@ class Ear:
             yield block
             state = block.after
 
-    def _block(self, state: EarState, end: int, stop: int) -> _Block:
+    def _block(self, state: EarState, end: int, stop: int) -> "_Block":
         """Frames up to `stop` from the sound up to sample `end`."""
         begin = max(0, state.frames - self.reach.before)
         window = state.heard[(begin - state.first) * STEP : end - state.first * STEP]

@@ -1,7 +1,5 @@
 """Speech in, emotion out: for a whole utterance, along time, or as the sound comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -152,7 +150,7 @@ class EmotionReader:
         hop_s: float = HOP_S,
         speaker: Floats | None = None,
         sample_rate: int | None = None,
-    ) -> EmotionStream:
+    ) -> "EmotionStream":
         """Sound in pieces of any size; `sample_rate` must be the model's."""
         checked_rate(self.rate if sample_rate is None else sample_rate, self.rate)
         check_windows(window_s, hop_s)

@@ -1,7 +1,5 @@
 """Emotions along time, from windows of a sound."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

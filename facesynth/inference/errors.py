@@ -1,7 +1,5 @@
 """The one exception that means "the input is wrong", as opposed to "the program is"."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """What sound and phones lead one to expect: log-mel bands at any time, and a small network's poses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ Deng 2006, §5.2: the signals lie in an expression eigenspace of three dimension
 emotion (`patches`), scaled by how strongly it is felt at each moment, and added; lips that were shut are shut after it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

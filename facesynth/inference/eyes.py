@@ -1,7 +1,5 @@
 """Eyes from recorded ones: lids and gaze grow together from patches of recordings (Deng 2006, ch. 3), and go with the head."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

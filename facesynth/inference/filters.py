@@ -1,7 +1,5 @@
 """Filters and splines over time: what scipy would give, in numpy. Signals are [T, C], time first."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """An exported folder: nothing in it is used before its hash is found right."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping

@@ -3,8 +3,6 @@
 Angles [T, 2] are to the performer's left and up, radians.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """ONNX graphs whose inputs are checked against the manifest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Smoothing the joint between two pieces of motion."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

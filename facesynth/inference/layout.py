@@ -1,7 +1,5 @@
 """What the channels of a motion are."""
 
-from __future__ import annotations
-
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The linear dynamical system: sound in, frames out, at once or as the sound comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -133,7 +131,7 @@ class Lds:
         """The frames that were held back: after the end there is silence."""
         return self._frames(state, max(1, self._most(state)))
 
-    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream:
+    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> "LdsStream":
         """Sound in pieces of any size; `sample_rate` must be the model's."""
         checked_rate(self.rate if sample_rate is None else sample_rate, self.rate)
         return LdsStream(self, self.start(seed=seed, noise=noise))

@@ -1,7 +1,5 @@
 """The opening of the mouth: the gap between the inner lips, and where p, b and m close it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From a folder to a model."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Facial movement: frames of channels at a rate, with the head and the eyes beside them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

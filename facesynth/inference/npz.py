@@ -4,8 +4,6 @@ The size is looked at before anything is unpacked, nothing is unpickled, and wha
 one line.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import tokenize

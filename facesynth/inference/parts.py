@@ -1,7 +1,5 @@
 """A folder of graphs without a method: audio features, or what moves a face."""
 
-from __future__ import annotations
-
 from .folder import Folder, stated_by_manifest
 from .graphs import Graph
 

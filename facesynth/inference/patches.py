@@ -8,8 +8,6 @@ patch qualifies when the two differ by less than a tolerance,
 with the variance V_c of each channel. One of those that qualify is drawn, and faded in over the zone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

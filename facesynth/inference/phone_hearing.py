@@ -1,7 +1,5 @@
 """Phones heard in a sound that nobody wrote down: at once, or as the sound comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -45,7 +43,7 @@ class PhoneHearing:
         log_probabilities, _ = Ear(self.network, WHOLE).hear(resample(audio, sample_rate, RATE))
         return spikes(log_probabilities, self.alphabet)
 
-    def stream(self, *, look_ahead_s: float = 0.4, sample_rate: int | None = None) -> PhoneStream:
+    def stream(self, *, look_ahead_s: float = 0.4, sample_rate: int | None = None) -> "PhoneStream":
         """Sound in pieces of any size; `sample_rate` must be RATE, and the look-ahead is that of the network's windows."""
         checked_rate(RATE if sample_rate is None else sample_rate, RATE)
         return PhoneStream(self, Reach.seconds(STREAM_BLOCK_S, STREAM_PAST_S, look_ahead_s))

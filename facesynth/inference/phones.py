@@ -1,7 +1,5 @@
 """Phones and viseme classes: which labels exist, which look alike on the face."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from .errors import unknown

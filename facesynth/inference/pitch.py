@@ -1,7 +1,5 @@
 """Pitch of windows of sound."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """How probable each state of a chain is, where every path counts by the exponential of its score."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

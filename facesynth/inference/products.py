@@ -1,7 +1,5 @@
 """Matrix products on one thread."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Rotations as unit quaternions [..., 4] (w, x, y, z), and curves through them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

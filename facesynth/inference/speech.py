@@ -1,7 +1,5 @@
 """The sound of an utterance and what is said in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self

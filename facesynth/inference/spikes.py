@@ -1,7 +1,5 @@
 """From the network's probabilities to phones: it was trained for CTC and tells each by a spike of a frame or two."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

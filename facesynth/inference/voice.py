@@ -1,7 +1,5 @@
 """Statistics of a voice by which emotions differ, none of which depends on how loud the recording is."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Stretching a piece of motion to another number of frames."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import numpy as np

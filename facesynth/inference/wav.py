@@ -1,7 +1,5 @@
 """WAV files of 16 bits a sample, plain or with the extended header that many programs write."""
 
-from __future__ import annotations
-
 import mmap
 import struct
 import warnings

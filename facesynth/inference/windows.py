@@ -1,7 +1,5 @@
 """Windows of sound, one for each frame of a motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every method of the zoo is: an `nn.Module` that learns from a corpus and turns speech into motion."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field

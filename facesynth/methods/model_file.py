@@ -1,7 +1,5 @@
 """Trained models on disk: one safetensors file, what is no tensor as JSON in its metadata; never pickle."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from errno import EIO

@@ -1,7 +1,5 @@
 """Modules of torch, called as the graphs of an exported folder are: named arrays in, arrays out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

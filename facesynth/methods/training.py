@@ -1,7 +1,5 @@
 """From a corpus to a trained method: what to use is learned first, then the method."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, TypeVar
 

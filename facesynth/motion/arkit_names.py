@@ -1,7 +1,5 @@
 """The 52 shapes of ARKit, which many systems capture faces in."""
 
-from __future__ import annotations
-
 ARKIT_NAMES: tuple[str, ...] = (
     *(f"eye{what}{side}" for side in ("Left", "Right")
       for what in ("Blink", "LookDown", "LookIn", "LookOut", "LookUp", "Squint", "Wide")),

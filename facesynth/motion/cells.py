@@ -1,7 +1,5 @@
 """Tables of numbers as text: commas, semicolons or tabs, decimal points or commas, with or without names of columns."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

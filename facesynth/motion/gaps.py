@@ -1,7 +1,5 @@
 """Missing samples: which are filled, which stay missing, and an account of both."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

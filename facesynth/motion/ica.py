@@ -1,7 +1,5 @@
 """Independent components of motion, in an order and with signs that repeat."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any, Self
 

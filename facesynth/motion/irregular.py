@@ -1,7 +1,5 @@
 """Signals whose samples do not lie at regular times: their rate, and their values at the times between."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

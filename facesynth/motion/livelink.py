@@ -5,8 +5,6 @@ by their names, whatever their order and case; the numbers may be shares or per 
 semicolons. A row stands where its time code puts it: rows that were lost leave gaps, rows that are there twice are read once.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Points of a face in the plane of a picture: their layout, and where the head was."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 
@@ -30,7 +28,7 @@ class HeadMaps:
         """The inverse of `to_picture`."""
         return (points - self.shift[:, None]) @ np.linalg.inv(self.linear)
 
-    def at(self, numbers: NDArray[np.int64]) -> HeadMaps:
+    def at(self, numbers: NDArray[np.int64]) -> "HeadMaps":
         """Those of some frames."""
         return HeadMaps(self.linear[numbers], self.shift[numbers])
 

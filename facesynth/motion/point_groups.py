@@ -1,7 +1,5 @@
 """Which points of a face are lips, jaw, brows, skull …: from what they are called, or from how they move."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ A pose [6] is a rotation vector (rad; the rotation acts on column vectors, about
 points) followed by a translation (mm).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline

@@ -1,7 +1,5 @@
 """Smooth maps through scattered samples by radial basis functions."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, Self
 
 import numpy as np

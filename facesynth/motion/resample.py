@@ -1,7 +1,5 @@
 """The same movement at another frame rate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +43,7 @@ class _Change:
     """[T'] where the new frames lie, in old frames; those after the last old frame lie on it."""
 
     @classmethod
-    def between(cls, fps: float, new_fps: float, frames: int) -> _Change:
+    def between(cls, fps: float, new_fps: float, frames: int) -> "_Change":
         count = max(round(frames / fps * new_fps), 1)
         return cls(fps, new_fps, np.minimum(np.arange(count) * fps / new_fps, frames - 1))
 

@@ -1,7 +1,5 @@
 """Frame rates of film and television, and time as hours, minutes, seconds and frames."""
 
-from __future__ import annotations
-
 import math
 
 

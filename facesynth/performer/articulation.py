@@ -6,8 +6,6 @@ their neighbours along and weak ones (`hh`, `k`) take the shape of what surround
 lips that close for p, b, m do close, and are carried as tracks of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

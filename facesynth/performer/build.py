@@ -1,7 +1,5 @@
 """The built-in performer's corpus: every take of the script on disk, built once, continued where it was interrupted."""
 
-from __future__ import annotations
-
 import signal
 from collections import deque
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The performance as a motion capture stage would record it: 90 markers, noise, gaps, and a few takes gone wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

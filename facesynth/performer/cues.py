@@ -1,7 +1,5 @@
 """What in a voice moves the rest of the face and the head: loudness, pitch, accents, whether it speaks at all."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feelings on the face: poses that grow, waver, differ from take to take, and give way to what the mouth has to do."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Blinks and gaze: the eyes keep to the listener while the head moves, look away now and then, and shut for a moment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The head: it drifts, nods on accents, follows pitch and loudness, and carries the emotion in its posture."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

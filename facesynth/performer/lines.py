@@ -1,7 +1,5 @@
 """New speech in the performer's voice: lines that are not in the script, each with its own feeling."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

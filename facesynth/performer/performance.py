@@ -1,7 +1,5 @@
 """An utterance becomes a performance: 52 facial weights, head and eyes at every frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Every utterance, neutral ones too, goes through the same analysis and synthesis,
 about the emotion; and every take differs from the last in tempo, pitch and loudness, as an actor's would.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the built-in performer says: 225 English sentences, ordered so that every beginning of the list is worth recording."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One sentence on the capture stage: said, aligned, acted and recorded in every emotion and take that is wanted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

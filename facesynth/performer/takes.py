@@ -1,7 +1,5 @@
 """Which takes the built-in performer records, and where in the corpus they belong."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What each phone wants of jaw, lips and tongue, and how strongly: the table targets.csv."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass

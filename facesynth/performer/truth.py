@@ -1,7 +1,5 @@
 """What is wrong with the built-in performer's recordings, written down, so that finding it can be tested."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ sound files it wrote. Without its two noise sources it gives the same bytes ever
 CC0 recordings, fine-tuned from another voice (lessac, U.S. English).
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import subprocess

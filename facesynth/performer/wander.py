@@ -1,7 +1,5 @@
 """Slow, aimless movement: what no living face or head is without."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d

@@ -1,7 +1,5 @@
 """When each phone of a known transcript is said."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

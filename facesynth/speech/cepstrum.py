@@ -1,7 +1,5 @@
 """The real cepstrum of a whole sound; torchaudio has cepstra of mel bands only."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional

@@ -1,7 +1,5 @@
 """Phones of a sound of which nobody knows the words, by pocketsphinx: where the phone network is not installed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Any
 

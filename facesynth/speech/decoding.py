@@ -1,7 +1,5 @@
 """The pocketsphinx decoder as alignment and recognition use it: its sound, its settings, its clock."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What stands in a transcript and is not said: `[music]`, `(laughs)`, `*sighs*`, `♪`."""
 
-from __future__ import annotations
-
 import re
 
 _DIRECTIONS = (

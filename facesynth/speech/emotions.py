@@ -1,7 +1,5 @@
 """Emotions over time in files: CSV with a header, and lines of `end emotion`."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

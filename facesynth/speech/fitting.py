@@ -1,7 +1,5 @@
 """Known words fitted to a sound by pocketsphinx: when each is said, when each of its phones, and how well it all fits."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Letters as English has them: marks that nobody hears go, letters of other alphabets become the nearest of a to z."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Mapping

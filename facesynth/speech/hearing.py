@@ -1,7 +1,5 @@
 """From a file of sound and what is known of it to a `Speech`: the one way in for recorded speech."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

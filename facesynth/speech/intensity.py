@@ -1,7 +1,5 @@
 """How strongly an emotion is felt over time, in files: a CSV of time_s,intensity."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """English letters to sounds by rule, for words that no dictionary has."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from importlib import resources

@@ -1,7 +1,5 @@
 """Log-mel bands: the plainest picture of a sound that a small network or a regression can read."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

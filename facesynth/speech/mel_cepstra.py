@@ -1,7 +1,5 @@
 """Mel bands and cepstra (MFCC) of a voice, as emotions are read from."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torchaudio.functional import create_dct, melscale_fbanks, spectrogram

@@ -5,8 +5,6 @@ wheels for most computers) and inflect (MIT, pure Python). inflect writes out pl
 around them is read by the rules below.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Sound of several channels, mixed to one as it is read, so that the others are never held in memory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

@@ -3,8 +3,6 @@
 torchaudio's spectrogram steps by whole samples: at 29.97 frames a second it is 15 ms off the picture after a minute.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal, get_args
 

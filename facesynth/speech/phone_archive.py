@@ -4,8 +4,6 @@ It is a file of the distribution `hama` 1.7.0 (Seongmin Park, Apache-2.0), of wh
 say which recordings the weights were learned from.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

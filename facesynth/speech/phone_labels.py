@@ -4,8 +4,6 @@ One table of articulatory features, `ipa.csv`, holds the sounds of all languages
 English phone whose lips look most like it.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 import unicodedata

@@ -1,7 +1,5 @@
 """The network that hears phones of any speaker and language: sound in, probabilities of IPA tokens and hidden layers out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """The one way to phones: from a sound and what is known of it to a track with times, confidences and remarks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal

@@ -1,7 +1,5 @@
 """A long sound cut where it is quietest."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

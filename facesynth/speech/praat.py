@@ -4,8 +4,6 @@ A text file of Praat is a row of values: numbers that stand free, texts in doubl
 flags in angle brackets. Everything else, such as `xmin =` and `intervals [3]:`, is decoration, and `!` begins a remark.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """How words are pronounced: from the CMU dictionary, and by rule where it does not know a word."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

@@ -4,8 +4,6 @@ torchaudio has mel cepstra, but no critical bands, no all-pole model and no RAST
 the filter, keeps no state between pieces.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Phones of a sound of which nobody knows the words, in any language: heard by a network, placed by pocketsphinx."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """From labelled stretches of time, as files and aligners give them, to a phone track without gaps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Phones and words in files that people edit: Praat's TextGrid, and lines of `end label`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

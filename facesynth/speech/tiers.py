@@ -1,7 +1,5 @@
 """Which tiers of a TextGrid hold the phones and the words, and whose they are; intervals made to follow one another."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

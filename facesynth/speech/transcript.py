@@ -1,7 +1,5 @@
 """What a person wrote, as the words that a person says."""
 
-from __future__ import annotations
-
 import re
 
 from facesynth.speech.directions import without_directions

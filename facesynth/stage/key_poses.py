@@ -1,7 +1,5 @@
 """Key poses of a performer: which frames are worth posing, the table in which somebody says the weights, what it teaches."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A mouth's motion on the speaker's real face, in video."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,7 +72,7 @@ class PictureStage:
     warnings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, mouth: Method, request: Request) -> PictureStage:
+    def of(cls, mouth: Method, request: Request) -> "PictureStage":
         """The speaker of a model; what was asked for that the pictures decide is warned of."""
         idle = [f"--{name}" for name in ("fps", "size") if getattr(request, name) is not None]
         idle += [f"--{name}" for name in ("head", "eyes") if getattr(request, name) != Part()]

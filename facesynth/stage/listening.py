@@ -1,7 +1,5 @@
 """From a recording to the speech that is to be said: what was given, what lies beside it, what is heard in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is asked of a performance: parsed once, checked when it is made, and never changed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -40,7 +38,7 @@ class Part:
     """Of the model, where whoever asked for it said so: `knn` or `head_knn` of a head."""
 
     @classmethod
-    def of(cls, text: str) -> Part:
+    def of(cls, text: str) -> "Part":
         """`off`, `recorded`, a factor such as 0.5, or a model as [METHOD:]FILE[:FACTOR]."""
         if text in ("off", "recorded"):
             return cls("off" if text == "off" else "recorded")

@@ -1,7 +1,5 @@
 """The pictures of a speaker whose real face is shown: taken from a corpus of followed points, kept beside the model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

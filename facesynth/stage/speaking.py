@@ -1,7 +1,5 @@
 """The one way from speech to a face: a mouth's motion, on a head or on the speaker's real face."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields

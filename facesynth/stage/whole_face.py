@@ -1,7 +1,5 @@
 """One whole face of what several models make: mouth first, then the head, then the eyes, which go with the head."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache

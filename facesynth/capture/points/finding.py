@@ -1,7 +1,5 @@
 """Which part of a picture the face is: found by the networks of this room, or said by a person."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Video of a speaker, at a steady rate, on the clock of its sound, and in one piece."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

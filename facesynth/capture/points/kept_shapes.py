@@ -1,7 +1,5 @@
 """Shapes kept in the user's cache: following points is by far the slowest step, and depends on the video and the points alone."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

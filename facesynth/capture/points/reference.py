@@ -1,7 +1,5 @@
 """The points of one speaker: chosen once on a reference picture, found again in every clip."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where to look for points: the lower face, and the still part above it that tells how the head moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +20,7 @@ class FaceRegion:
     """Nose, eyes and forehead; may be empty, and then the whole lower face tells how the head moves."""
 
     @classmethod
-    def from_box(cls, box: ArrayLike, height: int, width: int) -> FaceRegion:
+    def from_box(cls, box: ArrayLike, height: int, width: int) -> "FaceRegion":
         """From the face's box (left, top, right, bottom) px, brows to chin.
 
         The lower face is an ellipse over the bottom 45 % of it, the upper region the band from eyes to nose.
@@ -40,7 +38,7 @@ class FaceRegion:
         return cls(lower, (np.abs(across) <= 0.8) & (down >= 0.05) & (down <= 0.45))
 
     @classmethod
-    def from_mask(cls, mask: ArrayLike, height: int, width: int) -> FaceRegion:
+    def from_mask(cls, mask: ArrayLike, height: int, width: int) -> "FaceRegion":
         """From a drawn mask [H, W] of the lower face."""
         lower = np.asarray(mask) > 0
         if lower.shape != (height, width) or not lower.any():

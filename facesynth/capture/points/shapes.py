@@ -1,7 +1,5 @@
 """Followed points to shapes: gaps filled, the head's motion taken out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

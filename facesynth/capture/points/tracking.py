@@ -8,8 +8,6 @@ Both are OpenCV's: kornia has no Lucas-Kanade, and its measure of corners (`gftt
 between corners, and takes seven times as long.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Adding recordings to a corpus: a video each, or a sound and a motion file, with whatever lies beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

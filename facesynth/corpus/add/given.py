@@ -1,7 +1,5 @@
 """What was given of a recording: its files and what is said of it, so that adding it again tells what has changed."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass

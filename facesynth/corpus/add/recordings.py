@@ -1,7 +1,5 @@
 """Which files make a recording: what lies in a folder under one name."""
 
-from __future__ import annotations
-
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass

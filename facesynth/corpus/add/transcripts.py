@@ -1,7 +1,5 @@
 """What is said in many recordings, in one table."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Collection, Iterable, Mapping

@@ -1,7 +1,5 @@
 """Whether a motion's axes are those of its rest pose: to the performer's left, up, out of the face."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import permutations, product
 

@@ -1,7 +1,5 @@
 """Everything that is wrong with a corpus, in one run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

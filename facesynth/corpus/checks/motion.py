@@ -1,7 +1,5 @@
 """What can be wrong with a motion track by itself: missing, frozen, jumping, on other axes, or in another unit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Something that is wrong with a corpus."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar

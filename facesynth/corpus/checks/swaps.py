@@ -1,7 +1,5 @@
 """Markers that were taken for each other: the line from one to its neighbour is turned round against the rest pose."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 

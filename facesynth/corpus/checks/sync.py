@@ -5,8 +5,6 @@ them share. A regression from sound to opening, learned from the corpus itself, 
 are shifted against the others (or whose sound is another one's) but is blind to what they share.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Whether a motion is in its layout's unit: millimetres, pixels, or weights from 0 to 1."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

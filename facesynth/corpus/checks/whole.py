@@ -1,7 +1,5 @@
 """What can be wrong with a corpus as a whole, though each file by itself is right."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress

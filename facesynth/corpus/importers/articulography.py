@@ -1,7 +1,5 @@
 """Electromagnetic articulography in MVIEW's structs: sensors on tongue, lips and jaw, sound, phones and words in one file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

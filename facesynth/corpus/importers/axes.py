@@ -1,7 +1,5 @@
 """Which of a file's axes run to the performer's left, up, and out of the face, by what its markers are called."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from itertools import permutations, product

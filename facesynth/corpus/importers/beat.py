@@ -1,7 +1,5 @@
 """Weights of a face as BEAT keeps them: JSON with names, and frames that hold weights and a time each."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

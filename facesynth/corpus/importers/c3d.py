@@ -1,7 +1,5 @@
 """C3D, the file of optical motion capture: markers with names, gaps and a unit, and sound where an analog channel has it."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from pathlib import Path

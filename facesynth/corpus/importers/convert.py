@@ -1,7 +1,5 @@
 """Recordings of other systems, written as the plain files that `facesynth corpus add` reads."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """What a person says of files that do not say it themselves: what their channels are, and how they are written."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -96,7 +94,7 @@ class Written:
         scaled = np.asarray(points, np.float64) * (unit_mm(self.unit or unit) or 1.0)
         return turned(scaled, self.axes) if self.axes and points.shape[-1] == len(AXES) else scaled
 
-    def over(self, other: Written) -> Written:
+    def over(self, other: "Written") -> "Written":
         """These words, and the other's where these say nothing."""
         return replace(other, **{f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name)})
 

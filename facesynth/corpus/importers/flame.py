@@ -1,7 +1,5 @@
 """BEAT2: FLAME's pose over time, of which head, eyes and the opening of the jaw are used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One recording of any known system."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +31,7 @@ class Asked:
     otherwise: Layout | None = None
     """The layout of a table that names its channels nowhere."""
 
-    def over(self, beside: Description | None) -> Asked:
+    def over(self, beside: Description | None) -> "Asked":
         """The same, completed by the description that lies beside the file."""
         if beside is None:
             return self

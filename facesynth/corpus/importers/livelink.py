@@ -1,7 +1,5 @@
 """Takes of the Live Link Face app as recordings: weights by name, head and eyes where the app was told to stream them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

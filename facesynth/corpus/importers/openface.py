@@ -1,7 +1,5 @@
 """What OpenFace sees of a face in a video: 68 landmarks, head and gaze, a row a picture."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

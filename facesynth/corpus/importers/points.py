@@ -4,8 +4,6 @@ Such a corpus holds, beside what every corpus holds, `points.npz` (the reference
 each utterance `video/ID.SUFFIX`, a copy of its video, and `video/ID.npz`, where the points and the head are in it.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

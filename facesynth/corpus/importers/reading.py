@@ -1,7 +1,5 @@
 """A recording as another system keeps it: motion, and whatever else lies in the same file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

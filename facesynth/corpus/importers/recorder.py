@@ -1,7 +1,5 @@
 """One long sound for many clips: each clip's part of it, found by the clip's own sound."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

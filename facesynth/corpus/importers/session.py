@@ -1,7 +1,5 @@
 """The recordings of one performer together: the layout that most share, what its points are, and the face at rest."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """CSV, NPZ and MAT of any points or curves, with a layout that names them; and weights with a list of their names."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from itertools import permutations

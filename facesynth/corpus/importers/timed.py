@@ -1,7 +1,5 @@
 """Frames that carry their own times, at a steady rate."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sound, phones and words that lie in the file of the motion, laid beside it for as long as a recording is added."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Ordinary video as recordings: the face is captured, the corpus is made to fit its performer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path

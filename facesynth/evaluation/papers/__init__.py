@@ -1,7 +1,5 @@
 """The papers' own tables and figures, as far as a corpus and what is implemented allow."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Cao, Tien, Faloutsos and Pighin 2005."""
 
-from __future__ import annotations
-
 from facesynth.evaluation.cost import stopwatch
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.finding import Finding, not_available, values

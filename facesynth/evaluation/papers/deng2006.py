@@ -1,7 +1,5 @@
 """Deng 2006, the dissertation."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.evaluation.pair import UnavailableError

@@ -1,7 +1,5 @@
 """Chapter 3 of the dissertation: eyes by patches of recorded ones."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.evaluation.figures import as_uri, new_figure

@@ -1,7 +1,5 @@
 """Chapter 4 of the dissertation: head motion by nearest recorded movements and by hidden Markov models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

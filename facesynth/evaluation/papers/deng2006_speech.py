@@ -1,7 +1,5 @@
 """Deng 2006, §5.2: co-articulation curves, their trajectories, and the expression eigenspace."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Deng and Neumann 2008."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.corpus import Utterance

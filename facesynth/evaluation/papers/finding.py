@@ -1,7 +1,5 @@
 """What a paper states, what came out here, and whether the two may be compared: never more than that."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Speech as long as a paper's: utterances one after the other, cut where enough is said."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Learn from a part of the recordings, drive with the sound of the rest (Saisan 2004, §6): one table for one corpus."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Saisan, Bissacco, Chiuso and Soatto 2004."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.evaluation.papers import Material

@@ -1,7 +1,5 @@
 """Quiet natural eyes for a face whose own were not recorded: blinks, small gaze shifts, a look held while the head moves."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the tongue does for each phone; markers on the skin do not see it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Marker motion spread over a mesh by distance along its surface (Deng, Neumann 2008, §7.1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Marker motion spread over a mesh by radial basis functions, region by region (Cao 2005, §7)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

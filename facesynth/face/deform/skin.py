@@ -1,7 +1,5 @@
 """A face whose skin follows the markers themselves, not the weights that were solved from them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -7,8 +7,6 @@ Places in the rules are millimetres on this one mesh, from between the eyes: whe
 Colours and strengths were set by looking at pictures under this renderer's lights. Other heads bring their own colours.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

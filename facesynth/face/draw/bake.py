@@ -1,7 +1,5 @@
 """The look of the built-in head, worked out once and cached."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

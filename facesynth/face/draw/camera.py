@@ -1,7 +1,5 @@
 """Where pictures of a head are taken from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

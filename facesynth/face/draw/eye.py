@@ -1,7 +1,5 @@
 """The eye: a white ball, a cornea, an iris behind it, tears."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

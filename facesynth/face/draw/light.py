@@ -4,8 +4,6 @@ A key light from the upper left of the picture, a cool fill from the right, two 
 occlusion.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Everything about the look of a head that does not change from frame to frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """How much of the sky each point of a mesh sees: ambient occlusion from depth maps of many directions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

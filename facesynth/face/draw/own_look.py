@@ -1,7 +1,5 @@
 """The look of a head of one's own: its own colours under the same lights as the built-in head."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

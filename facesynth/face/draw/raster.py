@@ -5,8 +5,6 @@ has its own depth buffer of four samples per pixel, and depends on no other tile
 threads gives the same result. The kernels release Python's lock.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of a head, drawn by the processor alone: no window, no graphics driver."""
 
-from __future__ import annotations
-
 import os
 from collections import deque
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 All colours are linear RGB; lengths are mm.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

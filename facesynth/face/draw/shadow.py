@@ -1,7 +1,5 @@
 """The shadow that the key light throws: a map of depths seen from the light, and how it is looked up."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

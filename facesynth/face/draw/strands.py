@@ -1,7 +1,5 @@
 """Hair, eyebrows and lashes: strands grown once on the face at rest and carried by its surface afterwards."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

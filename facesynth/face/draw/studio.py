@@ -1,7 +1,5 @@
 """What stands behind a head, and how linear light becomes display values."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

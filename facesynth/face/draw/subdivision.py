@@ -1,7 +1,5 @@
 """Catmull-Clark subdivision as one sparse matrix, so that refining a posed mesh is one product."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

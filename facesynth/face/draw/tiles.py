@@ -1,7 +1,5 @@
 """From triangles and strands to pixels, one tile after the other."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The head's movement as a BVH file: one joint with position and rotation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

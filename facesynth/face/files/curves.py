@@ -1,7 +1,5 @@
 """Curves under any names as CSV: one column each, with the time; `facesynth corpus add` reads them again."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One call for every animation file; the suffix says which."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Live Link Face takes: a CSV of timecode, 52 weights and nine angles of head and eyes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

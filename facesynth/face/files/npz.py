@@ -1,7 +1,5 @@
 """Everything that facesynth knows about a movement, in one numpy archive without pickles."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The painted skin of the built-in head as a picture on its texture map, for viewers that do not know our renderer."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

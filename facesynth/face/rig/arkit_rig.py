@@ -1,7 +1,5 @@
 """A head that 52 ARKit weights, a head pose and a gaze move."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The names of a head of one's own against ARKit's: which channel does what, how strongly, and within which limits."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +38,7 @@ class ChannelMap:
     channels: tuple[Channel, ...]
 
     @classmethod
-    def of(cls, names: Sequence[str], given: Mapping[str, Channel] | None = None, *, needs_arkit: bool = True) -> ChannelMap:
+    def of(cls, names: Sequence[str], given: Mapping[str, Channel] | None = None, *, needs_arkit: bool = True) -> "ChannelMap":
         """The given channels, and for the others what their names mean where those are ARKit's.
 
         FacesynthError where a given channel does not exist, or where nothing at all follows ARKit's weights although

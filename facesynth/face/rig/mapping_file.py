@@ -1,7 +1,5 @@
 """Mapping files: what each channel of a head of one's own follows, in YAML."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where 90 markers sit on the built-in head, what they are called, and how far its lips are apart."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -112,7 +110,7 @@ class LipGap:
     """[7, 52] gap per unit of weight."""
 
     @classmethod
-    def of(cls, rig: Rig) -> LipGap:
+    def of(cls, rig: Rig) -> "LipGap":
         """Read the gaps off a rig."""
         pairs = rig.from_source(np.array(INNER_LIPS))
         rest_mm, slopes_mm = heights_between(rig.rest_mm, pairs), heights_between(rig.shapes_mm, pairs).T

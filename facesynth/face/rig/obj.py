@@ -1,7 +1,5 @@
 """Text files of meshes: Wavefront OBJ with groups, and MakeHuman's sparse `.target` displacement files."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from collections.abc import Container

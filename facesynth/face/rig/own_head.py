@@ -1,7 +1,5 @@
 """A head of somebody's own: triangles with morph targets under its own names, read from glTF or from OBJ files."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

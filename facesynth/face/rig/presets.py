@@ -1,7 +1,5 @@
 """Mappings for heads of usual makers, as files beside this module: by name, or the one that fits a head best."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources

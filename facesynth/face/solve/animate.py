@@ -1,7 +1,5 @@
 """From a motion to an animation of the built-in head."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

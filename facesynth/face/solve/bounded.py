@@ -1,7 +1,5 @@
 """Bounded, temporally regularised least squares: weights of linear shapes that come closest to targets over time."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray

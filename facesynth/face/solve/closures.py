@@ -5,8 +5,6 @@ millimetre or two apart on lips that are shut, and 25 pictures a second miss the
 head shuts what such an error left open. Least squares makes errors the other way as well: lips that are shut would cross.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ so themselves. Others are laid on the head by a rigid fit with one scale, bent o
 the nearest vertex of their part of the face.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

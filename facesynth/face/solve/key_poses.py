@@ -4,8 +4,6 @@ Deng 2006, §5.2.3: motion frames are reduced by PCA, an artist poses the head l
 carry these pairs over to all other frames.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

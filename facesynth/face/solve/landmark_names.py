@@ -1,7 +1,5 @@
 """Points of other systems that have a place among the head's own markers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 _SIDES = {  # marker without its side: landmark on the performer's right, on the left

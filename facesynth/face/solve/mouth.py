@@ -3,8 +3,6 @@
 On ARKit's heads mouthClose undoes jawOpen at the lips: more of it than of the jaw drives one lip through the other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """The speaker's face on synthesised shapes: warped training pictures over the speaker's own video, with a soft border."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Filling triangles with what is linear in them, pixel by pixel, on a processor."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

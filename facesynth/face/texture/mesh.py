@@ -1,7 +1,5 @@
 """The triangles over tracked points, and a still ring around them that keeps the rest of the picture in place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

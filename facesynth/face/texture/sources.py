@@ -1,7 +1,5 @@
 """Which training picture each synthesised frame is drawn from."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from numpy.typing import NDArray

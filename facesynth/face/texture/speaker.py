@@ -1,7 +1,5 @@
 """A speaker's pictures, each with its shape: what a textured face is drawn from, in one file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -75,7 +73,7 @@ class Speaker:
             np.savez_compressed(file, **{field.name: getattr(self, field.name) for field in fields(self)})
 
     @classmethod
-    def load(cls, path: str | Path) -> Speaker:
+    def load(cls, path: str | Path) -> "Speaker":
         """Read what `save` wrote; FacesynthError for anything else."""
         if not Path(path).is_file():
             raise FacesynthError(f"{path}: no such file; it is made by `facesynth train` beside a model of followed points")

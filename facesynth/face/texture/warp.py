@@ -7,8 +7,6 @@ that the triangles are filled here. Places are brought to -1 … 1 at the vertic
 that took twice as long as the reading.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import torch

@@ -1,7 +1,5 @@
 """From chosen nodes to one continuous motion: time-warp and blending (Cao 2005, §4.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Dynamic time-warping of audio features, over all candidates of a phone at once (Cao 2005, eq. 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

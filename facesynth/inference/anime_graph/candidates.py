@@ -1,7 +1,5 @@
 """Which nodes may express a phone, what becomes of the emotion they lack, and what the search needs to know of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

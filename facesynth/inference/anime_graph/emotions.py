@@ -1,7 +1,5 @@
 """Emotion maps put to use: any motion of a layout from one emotion to another, fully or by a share (Cao 2005, §5)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The anime graph of an exported folder."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..errors import FacesynthError

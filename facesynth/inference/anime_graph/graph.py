@@ -1,7 +1,5 @@
 """The anime graph: one node per recorded phone, an edge from each to the one recorded after it (Cao 2005, §4.1)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Self

@@ -1,7 +1,5 @@
 """Sound to the features of each phone, at once or as it comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The low-pass filter whose cut-offs the data name (Cao 2005, §4.3, smoothing)."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

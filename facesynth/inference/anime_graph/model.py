@@ -1,7 +1,5 @@
 """Sound and phones in, motion out: at once, or as they come in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any

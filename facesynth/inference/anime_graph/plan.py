@@ -1,7 +1,5 @@
 """From what is asked for to a path through the graph, with an account of it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

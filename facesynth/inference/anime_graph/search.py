@@ -1,7 +1,5 @@
 """The path through the graph: globally optimal, a mean over all paths, or with a look-ahead of some phones (Cao 2005, §4.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,7 +21,7 @@ class Weights:
     audio: float = 0.01
     pose: float = 0.0
 
-    def target(self, step: Step) -> Floats:
+    def target(self, step: "Step") -> Floats:
         """[n] what each candidate of a step costs, wherever one comes from."""
         cost = self.audio * step.audio
         return cost if step.pose is None else cost + self.pose * step.pose

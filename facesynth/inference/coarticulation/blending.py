@@ -5,8 +5,6 @@ weighted by polynomials in the time normalised to 0..1. Algorithm 1 lays such mo
 interval, `catBlend` fades the first out and the second in.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Phones in, motion out, from key shapes and polynomials; the sound is not heard."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """From a path of nodes to frames: stretching, joining, smoothing, and what the face does in silence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

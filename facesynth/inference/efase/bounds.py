@@ -6,8 +6,6 @@ that says the viseme of its captured predecessor, and the least cost of a step f
 a class plus the least cost of a step from that class to a node bounds the node's phi, and the same holds backwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 `COST = sum_t TC(o_t, o_t+1) + sum_t [OC(P_t, o_t) + EMP(E_t, o_t) + B(t, o_t)]`; `steps` has TC, the cost of a transition.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -54,7 +52,7 @@ class Query:
     def __len__(self) -> int:
         return len(self.phones)
 
-    def part(self, places: Ints) -> Query:
+    def part(self, places: Ints) -> "Query":
         """The query at consecutive positions."""
         first = int(places[0])
         fixed = {t - first: node for t, node in self.fixed.items() if first <= t <= places[-1]}

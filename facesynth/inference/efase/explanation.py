@@ -1,7 +1,5 @@
 """Why the search chose what it chose, phone by phone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

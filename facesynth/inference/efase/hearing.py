@@ -8,8 +8,6 @@ Two terms, both 0 in the paper:
   time-warped to the phone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Phones in, motion out: at once, or phone by phone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

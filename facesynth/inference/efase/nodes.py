@@ -1,7 +1,5 @@
 """Motion nodes: what was captured, one phone at a time, as a struct of arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

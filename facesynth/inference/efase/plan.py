@@ -6,8 +6,6 @@ best, so by default each stretch between silences is searched for itself, which 
 of a long input small. `bridge_pauses` gives the paper's reading.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

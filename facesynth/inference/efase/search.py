@@ -16,8 +16,6 @@ Bounds are compared with a margin for rounding; ties go to the node of the lowes
 in batches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise

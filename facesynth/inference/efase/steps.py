@@ -13,8 +13,6 @@ length and w goes from 0 to 1 over it: the sum of squared second differences, 0 
 integral of the second derivative itself, which would let bends cancel.)
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

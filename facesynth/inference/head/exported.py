@@ -1,7 +1,5 @@
 """From a folder to a model of the head."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

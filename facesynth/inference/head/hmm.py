@@ -6,8 +6,6 @@ which cluster the head is at each moment (eq. 4.15). Cluster means at six moment
 are the key points of a spherical cubic (eq. 4.16, 4.17).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

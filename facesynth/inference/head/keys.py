@@ -1,7 +1,5 @@
 """Key poses of a head, given by a person: at this time it looks there."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +35,7 @@ class HeadKeys:
         object.__setattr__(self, "poses", poses)
 
     @classmethod
-    def none(cls) -> HeadKeys:
+    def none(cls) -> "HeadKeys":
         """Nobody gave any."""
         return cls(np.zeros(0), np.zeros((0, 6)))
 

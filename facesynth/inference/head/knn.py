@@ -1,7 +1,5 @@
 """Head motion from the nearest recorded movements (Deng 2006, §4.3), for a whole sound or as it comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -119,7 +117,7 @@ class HeadKnn:
 
     def stream(
         self, *, look_ahead_s: float = 0.25, keys: HeadKeys | None = None, sample_rate: int | None = None
-    ) -> HeadKnnStream:
+    ) -> "HeadKnnStream":
         """Sound in pieces: a pose is final when the search has seen `look_ahead_s` more; endless, it is `head` of the whole."""
         checked_rate(RATE if sample_rate is None else sample_rate, RATE)
         if not look_ahead_s >= 0:

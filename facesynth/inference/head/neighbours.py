@@ -1,7 +1,5 @@
 """The nearest points of a set, exactly: a k-d partition, of which the leaves with the nearest boxes are searched."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -13,8 +13,6 @@ the sum of Wn NE + Wr RE and of Wa AE at each key pose and at the end. P, and so
 the best paths are kept with their poses: one, as in the dissertation, is exact for Wa = 0; with enough of them every search is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What of a voice the head follows: pitch, formants, cepstra and predictors, or prosody alone (Deng 2006, §4.3, §4.4)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

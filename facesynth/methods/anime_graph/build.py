@@ -1,7 +1,5 @@
 """From a corpus to an anime graph."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields
 

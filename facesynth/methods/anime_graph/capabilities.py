@@ -1,7 +1,5 @@
 """What the anime graph can do."""
 
-from __future__ import annotations
-
 from facesynth.methods.capabilities import (
     Accounting,
     Capabilities,

@@ -1,7 +1,5 @@
 """Independent components of a face: what the graph, the emotion maps and the low-pass filter work on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -40,7 +38,7 @@ class FaceComponents(nn.Module):
     captured_share: Tensor
     """[] share of the training motion's variance that the components hold."""
 
-    def fit(self, frames: NDArray[Any], layout: Layout, *, variance: float, seed: int) -> FaceComponents:
+    def fit(self, frames: NDArray[Any], layout: Layout, *, variance: float, seed: int) -> "FaceComponents":
         """Learn from complete frames [N, C]; `variance` is the share that PCA keeps in each block."""
         mean = np.asarray(frames, np.float64).mean(axis=0)
         parts = [(number, columns) for number, columns in enumerate(block_columns(layout)) if _moves(frames, columns)]

@@ -1,7 +1,5 @@
 """The first RASTA-PLP parameters of each phone: what a node sounded like."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Cut-off frequencies that the data name (Cao 2005, §4.3, smoothing)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Learning emotion maps from parallel sentences (Cao 2005, §5.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -127,7 +125,7 @@ class MapLearner:
         return min(error, key=lambda key: error[key])
 
     @cached_property
-    def _folds(self) -> list[tuple[MapLearner, Floats, Floats]]:
+    def _folds(self) -> "list[tuple[MapLearner, Floats, Floats]]":
         """Learners of most sentences, with what the others ask and want of them."""
         sentences = sorted({s.sentence for s in self.samples})
         folds = []

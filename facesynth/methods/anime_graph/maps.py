@@ -1,7 +1,5 @@
 """Emotion maps: from the components of a motion in one emotion to those of another (Cao 2005, §5)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The anime graph as a method of the zoo."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import permutations
 from typing import Any, Self

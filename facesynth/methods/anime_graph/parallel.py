@@ -1,7 +1,5 @@
 """Sentences that were recorded in several emotions, and several times: what emotion maps are learned from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations

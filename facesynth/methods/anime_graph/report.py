@@ -1,7 +1,5 @@
 """How well emotion maps do on sentences they did not see, and how many parallel sentences they need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -104,7 +102,7 @@ class MapTrial:
             curve[count] = float(np.mean(errors))
         return curve
 
-    def with_sentences(self, most: int) -> MapTrial:
+    def with_sentences(self, most: int) -> "MapTrial":
         """The same with at most so many sentences, those that were recorded in the most emotions."""
         emotions: dict[str, set[str]] = {}
         for take in self.takes:

@@ -1,7 +1,5 @@
 """Which components carry speech, and which emotion (Cao 2005, §5.1.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """The paths through the graph by torch tensors, wherever a model has been moved to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the reference methods can do."""
 
-from __future__ import annotations
-
 from facesynth.methods.capabilities import Capabilities
 
 HOME = "facesynth.methods.baselines"

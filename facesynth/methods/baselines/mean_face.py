@@ -1,7 +1,5 @@
 """The mean face: what an error means that knows nothing of the speech."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The phone mean: one static pose per phone, the visemes of the animator's table."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import Any, Self
 

@@ -1,7 +1,5 @@
 """Ridge: what a linear map from sound to motion reaches."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np

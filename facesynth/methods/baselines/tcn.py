@@ -1,7 +1,5 @@
 """A small temporal convolution network: what a user would train instead."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np

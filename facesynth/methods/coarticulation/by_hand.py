@@ -4,8 +4,6 @@ A table (CSV) has a row for each shape, with the phones that it is for, and a co
 row names take the first shape that is given for a phone of their viseme class, so that fifteen rows are enough.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How much each phone's sample counts in a recorded frame: non-negative least squares, all frames at once."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Key shapes of phones from recordings: means that few samples draw to their class, and what neighbours change of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is learned from of each recording: the middle of every phone, and the frames between neighbouring ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """From weights of recorded transitions to polynomials by viseme class (Deng 2006, eq. 5.3 to 5.9)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

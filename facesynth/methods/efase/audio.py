@@ -1,7 +1,5 @@
 """What is learned of sound for the target cost: how the nodes sounded, and what pose a sound leads one to expect."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -92,7 +90,7 @@ class AudioTerms(nn.Module):
         """Whether neither term is there."""
         return self.sound is None and self.predictor is None
 
-    def share(self, other: AudioTerms) -> None:
+    def share(self, other: "AudioTerms") -> None:
         """Take the terms that are wanted here from another, learned one."""
         for name in ("sound", "predictor"):
             if getattr(self, name) is not None:

@@ -1,7 +1,5 @@
 """What eFASE can do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from facesynth.methods.capabilities import Accounting, Capabilities, Explaining, Joining, Option, Reporting

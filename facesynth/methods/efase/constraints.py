@@ -1,7 +1,5 @@
 """Hard constraints: which recorded node must be said at which phone."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from math import isfinite

@@ -1,7 +1,5 @@
 """From recordings to motion nodes (Deng 2008, §4)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ component of the sound and of the expected pose, as `descent` tells; and, on the
 much the mean must be sharpened to move as quickly as they do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """eFASE as a method of the zoo."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self

@@ -1,7 +1,5 @@
 """How large the constant PNT is: the papers only say "a large constant"."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from facesynth.inference.efase.costs import Weights

@@ -1,7 +1,5 @@
 """The cheapest path by torch tensors, wherever a model has been moved to."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 

@@ -7,8 +7,6 @@ processes. Every evaluation is kept in a file; a search that was interrupted and
 seed asks for the same trials, takes from there what is done and goes on.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -211,7 +209,7 @@ class _Workers:
         self.examples = examples_of(model, corpus) if workers == 1 else []
         self.pool: ProcessPoolExecutor | None = None
 
-    def __enter__(self) -> _Workers:
+    def __enter__(self) -> "_Workers":
         if self.workers > 1:
             path = self.folder / "model.safetensors"
             self.model.save(path)

@@ -1,7 +1,5 @@
 """Recordings to learn emotions from: a corpus, or a list of sound files."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Speech in, emotion out: for a whole utterance or along time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From the margins of pairwise classifiers to the probabilities of classes."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

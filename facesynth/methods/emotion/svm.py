@@ -1,7 +1,5 @@
 """A multi-class support vector machine: fitted by scikit-learn, run by torch."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Literal, Self

@@ -1,7 +1,5 @@
 """How well emotions are recognised: Cao 2005, Table I, and what it does not show."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

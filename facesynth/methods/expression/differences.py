@@ -1,7 +1,5 @@
 """What an emotion adds to a neutral recording of the same sentence, moment by moment."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

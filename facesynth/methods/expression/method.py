@@ -1,7 +1,5 @@
 """The expression eigenspace as a method of the zoo."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np

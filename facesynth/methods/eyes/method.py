@@ -1,7 +1,5 @@
 """Eyes as a method of the zoo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Self
 

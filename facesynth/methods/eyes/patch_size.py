@@ -1,7 +1,5 @@
 """How long a patch of recorded eyes must be to hold what eyes do (Deng 2006, §3.4)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

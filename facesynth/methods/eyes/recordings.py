@@ -1,7 +1,5 @@
 """Recorded eyes as they are learned from: lids that shut, gaze apart from what the head did to it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A hidden Markov model with an exit, learned by forward-backward (Rabiner 1989), many sequences at once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What hidden Markov models of the head can do."""
 
-from __future__ import annotations
-
 from facesynth.methods.capabilities import Capabilities
 
 CAPABILITIES = Capabilities(

@@ -1,7 +1,5 @@
 """Vector quantisation by splitting (Linde, Buzo, Gray 1980)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hidden Markov models of the head as a method of the zoo."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any, Self
 

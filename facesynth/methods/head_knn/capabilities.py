@@ -1,7 +1,5 @@
 """What the nearest recorded head movements can do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from facesynth.methods.capabilities import Capabilities, Option

@@ -1,7 +1,5 @@
 """Weights of the search by descent from many places at once (Deng 2006, eq. 4.12 to 4.14)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What the linear dynamical system can do."""
 
-from __future__ import annotations
-
 from facesynth.methods.capabilities import Capabilities, Option
 
 CAPABILITIES = Capabilities(

@@ -1,7 +1,5 @@
 """The deterministic part: subspace from the inputs' projection, then linear least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The input of the system: principal components of the periodogram, in units of their standard deviation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Self
 

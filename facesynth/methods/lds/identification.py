@@ -1,7 +1,5 @@
 """From recordings to a linear system: the orthogonal decomposition, step by step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

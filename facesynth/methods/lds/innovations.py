@@ -1,7 +1,5 @@
 """The noise that drives the stochastic part: independent sources, each with its histogram."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Self
 

@@ -1,7 +1,5 @@
 """How many states, and which lead of the sound: by the error on clips that were left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What identification found, drawn: how many states there are, and what the noise looks like."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

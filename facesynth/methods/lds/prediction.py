@@ -1,7 +1,5 @@
 """How well the model predicts the next frame of a recording, beside what predicts nothing at all."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

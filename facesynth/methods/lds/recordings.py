@@ -1,7 +1,5 @@
 """From a corpus to clips: what the system is identified from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

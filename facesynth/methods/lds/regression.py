@@ -1,7 +1,5 @@
 """Least squares on tall matrices that are never held as a whole."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Running the system: any length at once, or frame by frame with the state handed on."""
 
-from __future__ import annotations
-
 from typing import Self
 
 import numpy as np

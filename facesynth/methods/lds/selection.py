@@ -1,7 +1,5 @@
 """What a user left to be chosen: the lead of the sound and the numbers of states, by the error on clips left out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """The stochastic part: realisation from the canonical correlations of past and future."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ that white noise drives:
 Arrays are float64, time first: signals [T, channels], bundles of R signals [T, channels, R].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +28,7 @@ class Clip:
     y: Array
     """[T, p] shape."""
 
-    def centred(self) -> Clip:
+    def centred(self) -> "Clip":
         """The same with zero means."""
         return Clip(self.u - self.u.mean(axis=0), self.y - self.y.mean(axis=0))
 

@@ -4,8 +4,6 @@ Numbers are learned by their logarithms, which are drawn back to where they star
 Sentences are parted in three: the database, those to learn from, and those that say when to stop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar

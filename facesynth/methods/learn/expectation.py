@@ -3,8 +3,6 @@
 It predicts the average, which moves too little; the search uses it to tell which captured nodes fit what is heard.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the reference methods take from a corpus."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

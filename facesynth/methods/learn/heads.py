@@ -1,7 +1,5 @@
 """What methods of the head learn from: sound with the poses that were recorded with it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

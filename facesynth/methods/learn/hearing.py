@@ -1,7 +1,5 @@
 """What the regressions hear: standardised log-mel bands, or hidden layers of the phone network, around a time."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The small network: four 1-D convolutions over frames of sound, and how it is trained."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Ridge regression from sums over samples: memory does not grow with the recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
@@ -35,7 +33,7 @@ class Moments:
         self.xy += x.T @ y
         self.yy += float(np.square(y, dtype=np.float64).sum())
 
-    def __add__(self, other: Moments) -> Moments:
+    def __add__(self, other: "Moments") -> "Moments":
         return Moments(*(getattr(self, name) + getattr(other, name) for name in ("count", "x", "y", "xx", "xy", "yy")))
 
     def solutions(self, alphas: Iterable[float]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:

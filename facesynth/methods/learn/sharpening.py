@@ -1,7 +1,5 @@
 """How much a mean over many motions must be sharpened: it moves too little."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

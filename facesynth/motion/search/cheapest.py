@@ -7,8 +7,6 @@ their row: the best ones first, then all that are not beyond what these cost. So
 float64 throughout; ties go to the first candidate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

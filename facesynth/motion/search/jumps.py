@@ -3,8 +3,6 @@
 step(i, j) = jump + jump_cost · ‖last frame of i - first frame of j‖
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch

@@ -12,8 +12,6 @@ is the bending of a blend from i, stretched to the length of pre(j), into pre(j)
 second difference and w from 0 to 1. Side by side, for all j whose pre(j) has one length, both are one product.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Steps between a speaker's pictures: staying on one, or going on to the one recorded next, is free."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch

@@ -9,8 +9,6 @@ and alpha + beta - log Z is the logarithm of each candidate's posterior. tau -> 
 differentiable in targets, steps and temperature. Blocks are made again on the way back, in place of being kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

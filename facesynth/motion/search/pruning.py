@@ -11,8 +11,6 @@ its cost bounds the best from above, and a node with F + R beyond that stands on
 phone, goes through `cheapest`, which finds the path that it would find among all nodes, ties included.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

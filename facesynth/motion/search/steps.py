@@ -1,7 +1,5 @@
 """What a search asks of steps, and steps whose costs are given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 

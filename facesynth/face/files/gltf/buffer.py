@@ -1,7 +1,5 @@
 """Arrays laid one after the other in the binary chunk of a .glb, each with the accessor that describes it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The built-in head with its 52 shapes and an animation as a glTF document."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

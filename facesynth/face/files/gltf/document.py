@@ -1,7 +1,5 @@
 """glTF 2.0 documents that others wrote: taken apart, with the arrays behind their accessors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Triangle meshes as file formats want them, one texture coordinate and one normal per vertex, and how they go into a buffer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +26,7 @@ class TriangleMesh:
     """[F, 3] by part of the head, counter-clockwise seen from outside."""
 
     @classmethod
-    def of(cls, rig: Rig, parts: tuple[str, ...]) -> TriangleMesh:
+    def of(cls, rig: Rig, parts: tuple[str, ...]) -> "TriangleMesh":
         """The named parts of a rig."""
         chosen = np.isin(rig.quad_part, [PARTS.index(name) for name in parts])
         quads, part = rig.quads[chosen], rig.quad_part[chosen]

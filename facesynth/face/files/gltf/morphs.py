@@ -1,7 +1,5 @@
 """What the morph targets of a mesh are called: exporters keep the names in a handful of places."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """A head of one's own as glTF: its own file with the animation in it, or a new file for a set of OBJ files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pygltflib as gl
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """What a glTF file shows at rest: meshes with morph targets where their nodes put them, and the colour of their skin."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Movement over time as glTF keeps it: a track of a node's weights, rotation or translation."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A head with its shapes and an animation in one binary glTF file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pygltflib as gl
