@@ -129,6 +129,40 @@ class Streaming(Protocol):
         ...
 
 
+class Draft(Protocol):
+    """What was found for a speech while it is edited; its motion is made when it is asked for."""
+
+    @property
+    def changed_s(self) -> tuple[float, float] | None:
+        """From where to where its motion may look otherwise than that of the editor's draft before it; None: nowhere."""
+        ...
+
+    def motion(self, start_s: float = 0.0, stop_s: float | None = None) -> Motion:
+        """The whole, as `synthesize` makes it, or the frames of a window, first shown while the whole is awaited."""
+        ...
+
+    def choices(self) -> list[dict[str, Any]]:
+        """An entry for each phone of what was chosen for it, as `explain` has it; none where nothing was chosen."""
+        ...
+
+
+class Editor(Protocol):
+    """Keeps what it found, so that a change of the speech or of an option costs little."""
+
+    def change(self, speech: Speech, *, seed: int = 0, **options: Any) -> Draft:
+        """The draft of a speech; options are the method's own, as of `synthesize`."""
+        ...
+
+
+@runtime_checkable
+class Editing(Protocol):
+    """Is quick after small changes; `facesynth.methods.editing.editor_of` makes an editor of every other method."""
+
+    def edit(self) -> Editor:
+        """A new editor, which knows nothing yet."""
+        ...
+
+
 WORDS: Mapping[type, tuple[str, str]] = {
     Explaining: ("tells nothing of its choices", "explain them"),
     Accounting: ("gives no account of its search", "give one"),
@@ -138,6 +172,7 @@ WORDS: Mapping[type, tuple[str, str]] = {
     Looking: ("knows nothing of the head", "do"),
     Expressing: ("adds no expression to other motion", "add one"),
     Streaming: ("makes no motion while the phones arrive", "do"),
+    Editing: ("makes everything anew after each change", "keep what they found"),
 }
 """What a method without an ability does not do, and what those with it do."""
 

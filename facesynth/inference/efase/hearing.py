@@ -8,7 +8,7 @@ Two terms, both 0 in the paper:
   time-warped to the phone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +57,9 @@ class PhoneSounds:
         spans = phone_spans(bands, phones, self.standard)
         return (((spans - self.centre) @ self.basis) / self.size).astype(np.float64)
 
-    def distances(self, sounds: Floats) -> Floats:
+    def distances(self, sounds: Sequence[Floats]) -> Floats:
         """[P, N] squared distance of sounds [P, A] to those of the nodes."""
-        return squared_distances(sounds, self.nodes.astype(np.float64))
+        return squared_distances(np.asarray(sounds).reshape(-1, self.nodes.shape[1]), self.nodes.astype(np.float64))
 
 
 def phone_spans(bands: Single, phones: PhoneTrack, standard: Standard) -> Single:
@@ -126,15 +126,25 @@ class Hearing:
 
     def hear(self, speech: Speech, felt: Ints, count: int, fps: float) -> Heard:
         """felt [P] numbers of the emotions, count nodes, fps of the database."""
-        labels, bounds, bands = speech.phones.labels, speech.phones.frame_bounds(fps), self.bands(speech)
+        labels, bounds, bands = speech.phones.labels, speech.phones.frame_bounds(fps), self.heard_bands(speech)
         spoken = np.array([label != SILENCE for label in labels])
         costs, sounds, poses = np.zeros((len(labels), count)), None, None
         if self.sounds is not None:
             sounds = self.sounds.of(bands, speech.phones)
-            costs[spoken] += self.sound_weight * self.sounds.distances(sounds[spoken])
+            costs[spoken] += self.sound_weight * self.rows("sound", self.sounds.distances, sounds[spoken])
         if self.expectation is not None and self.distances is not None:
             said = [PHONES.index(label) for label in labels]
             poses = self.expectation.poses(bands, said, speech.phones.ends_s, felt.tolist(), fps, int(bounds[-1]))
             asked = np.flatnonzero(spoken & (np.diff(bounds) > 0))
-            costs[asked] += self.pose_weight * self.distances.of([poses[bounds[t] : bounds[t + 1]] for t in asked])
+            pieces = [poses[bounds[t] : bounds[t + 1]] for t in asked]
+            if pieces:
+                costs[asked] += self.pose_weight * self.rows("pose", self.distances.of, pieces)
         return Heard(costs, sounds, poses)
+
+    def heard_bands(self, speech: Speech) -> Single:
+        """[F, 40] log-mel bands of the sound."""
+        return self.bands(speech)
+
+    def rows(self, what: str, compute: Callable[[Sequence[Floats]], Floats], asked: Sequence[Floats]) -> Floats:
+        """[P, N] costs of P phones at all nodes, of what is heard or expected of each; an heir may know some of them."""
+        return compute(asked)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ..closures import close_lips
 from ..efase.assembly import Smoothing, blend, concatenate, joints
-from ..efase.costs import Query, Weights
+from ..efase.costs import Query, Weights, all_targets
 from ..efase.explanation import explain, shares
 from ..efase.hearing import Heard, Hearing
 from ..efase.nodes import Floats, Ints, Nodes
-from ..efase.plan import Plan, plan_speech
+from ..efase.plan import Plan, Solved, plan_speech
 from ..efase.search import Engine, SearchIndex, Stretch
-from ..efase.soft import Mixture, soft_search
+from ..efase.soft import StepMatrix, soft_search
+from ..efase.steps import path_cost, step_matrix
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import at_rate, sharpen
@@ -70,6 +71,8 @@ class Parts:
     hearing: Hearing | None = None
     engine: Engine | None = None
     """What searches whole stretches; numpy unless another is given."""
+    step_matrix: StepMatrix = step_matrix
+    """What computes the costs of the steps that a mean over paths needs."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that the model came from, if it came from one."""
 
@@ -114,11 +117,19 @@ class Efase:
         new_fps = self.fps if fps is None else float(fps)
         if not (np.isfinite(new_fps) and new_fps > 0):
             raise FacesynthError(f"fps is {fps}; wanted a positive rate in Hz, or None for the model's {self.fps:g}")
-        labels, ends_s = speech.phones.labels, speech.phones.ends_s
-        feelings, intensity = speech.emotions.per_phone(speech.phones)
+        return self.moved(speech, self.plans(speech, constraints=constraints, look_ahead=look_ahead), new_fps)
+
+    def plans(self, speech: Speech, *, constraints: Mapping[int, str] | None = None, look_ahead: int | None = None) -> list[Plan]:
+        """One in the emotions of the track and, where one of those is weak, one in neutral."""
         plans = [self.plan(speech, constraints=constraints, look_ahead=look_ahead)]
-        if bool((intensity < 1).any()) and NEUTRAL in self.emotions:
+        if bool((speech.emotions.per_phone(speech.phones)[1] < 1).any()) and NEUTRAL in self.emotions:
             plans.append(self.plan(speech, emotion=NEUTRAL, constraints=constraints, look_ahead=look_ahead))
+        return plans
+
+    def moved(self, speech: Speech, plans: Sequence[Plan], fps: float | None = None) -> Motion:
+        """The motion of the speech that was planned, at `fps` (the corpus's rate unless given)."""
+        labels, ends_s, new_fps = speech.phones.labels, speech.phones.ends_s, self.fps if fps is None else fps
+        feelings, intensity = speech.emotions.per_phone(speech.phones)
         frames = self.frames(plans, labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
         return Motion(self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1])), new_fps, self.layout)
 
@@ -132,12 +143,22 @@ class Efase:
     ) -> Plan:
         """Search; `emotion` replaces the track's, `constraints` gives nodes by phone index."""
         query, heard = self.asked(speech, emotion, constraints)
-        engine, soften = self.parts.engine or self.index.cheapest_path, self._soften if self.settings.temperature > 0 else None
+        solve = self.solved
         if look_ahead is not None:
             self._require_steps()
-            engine = _looking_ahead(self.index, look_ahead)
-        plan = plan_speech(self.nodes, query, self.weights, engine, soften, bridge_pauses=self.settings.bridge_pauses)
+            solve = partial(self.solved, engine=_looking_ahead(self.index, look_ahead))
+        plan = plan_speech(query, solve, bridge_pauses=self.settings.bridge_pauses)
         return plan if heard is None else replace(plan, expected=heard.poses)
+
+    def solved(self, query: Query, engine: Engine | None = None) -> Solved:
+        """One stretch of speech: its cheapest path and, above temperature 0, the mean over paths around it."""
+        targets, temperature = all_targets(self.nodes, query, self.weights), self.settings.temperature
+        path = (engine or self.parts.engine or self.index.cheapest_path)(targets)
+        cost, mixtures = path_cost(self.nodes, query, path, self.weights), None
+        if temperature > 0:
+            limit, matrix = self.settings.candidates, self.parts.step_matrix
+            mixtures = soft_search(self.nodes, query, targets, self.weights, path, temperature, limit, matrix)
+        return Solved(path, cost, mixtures)
 
     def asked(
         self, speech: Speech, emotion: str | None = None, constraints: Mapping[int, str] | None = None
@@ -221,10 +242,6 @@ class Efase:
 
     def _frames_of(self, coordinates: Floats) -> Floats:
         return self.parts.decode(coordinates.astype(np.float32)).astype(np.float64)
-
-    def _soften(self, query: Query, targets: Floats, path: Ints) -> list[Mixture]:
-        temperature, limit = self.settings.temperature, self.settings.candidates
-        return soft_search(self.nodes, query, targets, self.weights, path, temperature, limit)
 
     def _require_steps(self) -> None:
         """A mean over paths, and a pose that is expected, look at the whole of what is said."""

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..efase.costs import Query, Weights, all_targets
-from ..efase.nodes import Floats, Ints, Nodes
-from ..efase.search import Engine
+from ..efase.costs import Query
+from ..efase.nodes import Floats, Ints
 from ..efase.soft import Mixture
-from ..efase.steps import path_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,25 +30,32 @@ class Plan:
     """[T, D] pose that the sound leads one to expect of each frame; None where nothing predicts it."""
 
 
-Soften = Callable[[Query, Floats, Ints], Sequence[Mixture]]
-"""Query, target costs [T, N] and cheapest path [T] to what stands beside that path."""
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The result of one search."""
+
+    path: Ints
+    """[T] a node for each phone."""
+    cost: float
+    mixtures: Sequence[Mixture] | None = None
+    """T mixtures of nodes; None where only the cheapest path counts."""
 
 
-def plan_speech(
-    nodes: Nodes, query: Query, weights: Weights, engine: Engine, soften: Soften | None = None, *, bridge_pauses: bool
-) -> Plan:
+Solve = Callable[[Query], Solved]
+
+
+def plan_speech(query: Query, solve: Solve, *, bridge_pauses: bool) -> Plan:
     """Search each stretch of the query, or all of it at once."""
     found = np.full(len(query), -1, np.int64)
     mixtures: list[Mixture | None] = [None] * len(query)
-    cost = 0.0
+    cost, soft = 0.0, False
     for places in [np.arange(len(query))] if bridge_pauses else stretches(query.phones):
-        asked = query.part(places)
-        targets = all_targets(nodes, asked, weights)
-        found[places] = path = engine(targets)
-        cost += path_cost(nodes, asked, path, weights)
-        if soften is not None:
-            mixtures[places[0] : places[-1] + 1] = soften(asked, targets, path)
-    return Plan(query, found, cost, None if soften is None else tuple(mixtures))
+        solved = solve(query.part(places))
+        found[places] = solved.path
+        cost += solved.cost
+        if solved.mixtures is not None:
+            soft, mixtures[places[0] : places[-1] + 1] = True, solved.mixtures
+    return Plan(query, found, cost, tuple(mixtures) if soft else None)
 
 
 def stretches(phones: Ints) -> list[Ints]:

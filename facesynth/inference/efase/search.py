@@ -19,7 +19,7 @@ in batches.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,16 @@ class Search:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def begun(self, count: int) -> Self:
+        """A search whose first `count` phones are those of this one, with all that is known of them.
+
+        What is known of a phone, exact or a bound, holds whatever follows it: both searches may go on, and each gains by what
+        the other finds of the phones that they share. Not after `settle`.
+        """
+        other = type(self)(self.index)
+        other.positions = self.positions[:count]
+        return other
 
     def push(self, targets: Floats) -> None:
         """The next phone, by the target cost [N] of every node."""

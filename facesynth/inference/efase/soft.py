@@ -4,7 +4,7 @@
 database has nodes it is exact.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -29,13 +29,24 @@ class Mixture:
     """Probability that the step into this phone was captured; 0 at the first phone."""
 
 
+StepMatrix = Callable[[Nodes, Ints, Ints, Weights], Floats]
+"""What `step_matrix` does, or remembers of it."""
+
+
 def soft_search(
-    nodes: Nodes, query: Query, targets: Floats, weights: Weights, path: Ints, temperature: float, limit: int
+    nodes: Nodes,
+    query: Query,
+    targets: Floats,
+    weights: Weights,
+    path: Ints,
+    temperature: float,
+    limit: int,
+    matrix: StepMatrix = step_matrix,
 ) -> list[Mixture]:
     """A mixture of nodes for each phone. targets [T, N]; `path` [T], the cheapest one, is always among the candidates."""
     chosen = candidates(nodes, query, targets, weights, path, limit)
     scores = [-target[which] / temperature for target, which in zip(targets, chosen, strict=True)]
-    moves = [-step_matrix(nodes, i, j, weights) / temperature for i, j in pairwise(chosen)]
+    moves = [-matrix(nodes, i, j, weights) / temperature for i, j in pairwise(chosen)]
     found, captured = posterior(scores, moves), [0.0]
     for t, (here, there) in enumerate(pairwise(chosen)):
         column = np.flatnonzero(np.isin(nodes.before[there], here))

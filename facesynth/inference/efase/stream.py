@@ -12,8 +12,8 @@ from ..efase.costs import target_costs
 from ..efase.nodes import Ints
 from ..efase.plan import Plan
 from ..efase.search import Stretch
+from ..efase.window import frames_between
 from ..errors import FacesynthError
-from ..filters import at_rate
 from ..phones import SILENCE
 from ..speech import NEUTRAL, frame_bounds
 
@@ -124,12 +124,7 @@ class EfaseStream:
         query = model.query(self.labels[own], self.feelings[own])
         plans = [Plan(query, np.array(path[own], np.int64), 0.0) for path in self.paths]
         frames = model.frames(plans, self.labels[own], self.feelings[own], np.array(self.intensity[own]), bounds[first:] - zero)
-        if self.fps == model.database_fps:
-            return frames[np.minimum(np.arange(start, stop) - zero, len(frames) - 1)].astype(np.float32)
-        count = max(round(int(bounds[-1]) / model.database_fps * self.fps), 1)
-        new = np.minimum(np.arange(start, stop), count - 1)
-        at = np.minimum(new * model.database_fps / self.fps, int(bounds[-1]) - 1) - zero
-        made = at_rate(frames, model.database_fps, self.fps, at)
+        made = frames_between(frames, zero, int(bounds[-1]), model.database_fps, start, stop, self.fps)
         if model.layout.kind == "curves":
             made = np.clip(made, 0.0, 1.0)
         return made.astype(np.float32)

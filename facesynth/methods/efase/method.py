@@ -13,6 +13,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.efase.assembly import Smoothing
 from facesynth.inference.efase.bounds import TABLES, step_bounds
 from facesynth.inference.efase.costs import Query, Weights
+from facesynth.inference.efase.editing import EfaseEditor
 from facesynth.inference.efase.hearing import Heard
 from facesynth.inference.efase.model import Efase as Speaker
 from facesynth.inference.efase.model import Parts, Settings
@@ -245,6 +246,10 @@ class Efase(Method):
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one, frames as soon as they are final; see `inference.efase.model`."""
         return self.speaker.stream(look_ahead=look_ahead, weakened=weakened, fps=fps)
+
+    def edit(self) -> EfaseEditor:
+        """For speech that is changed again and again; see `inference.efase.editing`."""
+        return EfaseEditor(self.speaker)
 
     def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
         """Chosen node, cost terms and runners-up for each phone."""
