@@ -89,10 +89,17 @@ class Ear:
 
     def hear(self, audio: ArrayLike) -> tuple[Single, Single]:
         """Log-probabilities [T, V] and hidden layers [T, L, W] of a whole sound [S] at RATE, all of it brought to one peak."""
+        blocks = list(self._of_whole(audio))
+        return np.concatenate([b.log_probabilities for b in blocks]), np.concatenate([b.hidden for b in blocks])
+
+    def read(self, audio: ArrayLike) -> Iterator[Single]:
+        """Log-probabilities [t, V] of a whole sound [S], window by window: what was read need not be kept."""
+        return (block.log_probabilities for block in self._of_whole(audio))
+
+    def _of_whole(self, audio: ArrayLike) -> "Iterator[_Block]":
         sound = checked_audio(audio)
         state = replace(self.start(), heard=_long_enough(sound), peak=float(np.abs(sound).max()))
-        blocks = list(self._blocks(state, ended=True))
-        return np.concatenate([b.log_probabilities for b in blocks]), np.concatenate([b.hidden for b in blocks])
+        return self._blocks(state, ended=True)
 
     def start(self) -> EarState:
         """Before the first sample."""

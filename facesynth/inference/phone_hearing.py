@@ -13,7 +13,7 @@ from .folder import Folder
 from .graphs import Graph, Part
 from .sound import resample
 from .speech import PhoneTrack
-from .spikes import Alphabet, Placed, Placer, Spike, SpikeReader, placed_around, spikes
+from .spikes import Alphabet, Placed, Placer, Spike, SpikeReader, placed_around
 
 STREAM_BLOCK_S, STREAM_PAST_S = 0.2, 4.0
 """Of a stream: phones come out this often, and the network looks back this far, seconds."""
@@ -40,8 +40,11 @@ class PhoneHearing:
 
     def spikes(self, audio: NDArray[Any], sample_rate: int) -> list[Spike]:
         """The phones of a whole sound [S] where the network tells them, in order of time."""
-        log_probabilities, _ = Ear(self.network, WHOLE).hear(resample(audio, sample_rate, RATE))
-        return spikes(log_probabilities, self.alphabet)
+        reader = SpikeReader(self.alphabet)
+        found = [
+            spike for block in Ear(self.network, WHOLE).read(resample(audio, sample_rate, RATE)) for spike in reader.read(block)
+        ]
+        return [*found, *reader.end()]
 
     def stream(self, *, look_ahead_s: float = 0.4, sample_rate: int | None = None) -> "PhoneStream":
         """Sound in pieces of any size; `sample_rate` must be RATE, and the look-ahead is that of the network's windows."""
