@@ -7,7 +7,6 @@ import pytest
 from bringing import added, corpus_of, spoken
 
 from facesynth.speech.audio import save_wav
-from facesynth.speech.phone_archive import is_installed
 
 PARAGRAPHS = (
     "The old boat moved up and down beside the harbour wall. Nobody had painted it for many years.",
@@ -22,8 +21,6 @@ OTHER = "Fourteen yellow parrots shouted at the judge through a broken telephone
 @pytest.fixture(scope="module")
 def told(voice, tmp_path_factory):
     """A file of all paragraphs, when each begins, and when the last ends, seconds."""
-    if not is_installed():
-        pytest.skip("the network that hears phones is not installed: pip install 'facesynth[phones]'")
     from facesynth.performer.voice import speak
 
     takes = speak(PARAGRAPHS)
