@@ -28,6 +28,7 @@ BELOW = {
     "evaluation": {"inference", "speech", "motion", "corpus", "face", "methods"},
     "export": {"inference", "speech", "motion", "face", "methods"},
     "stage": {"inference", "speech", "motion", "corpus", "capture", "face", "methods"},
+    "studio": {"inference", "speech", "motion", "corpus", "face", "methods", "stage"},
 }
 """What a room may import; the command line may import everything."""
 
@@ -174,6 +175,7 @@ IMPORTED_AS = {
 NOT_BY_US = {
     "setuptools": "pyworld imports it",
     "facesynth": "its own extras",
+    "websockets": "uvicorn speaks to the page through it",
     "optuna": "the parameter search is to use it, or it goes",
 }
 

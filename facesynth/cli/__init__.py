@@ -15,6 +15,7 @@ VERBS = {
     "corpus": ("facesynth.cli.corpus:corpus_group", "Make, fill and check a performer's recordings."),
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
+    "studio": ("facesynth.cli.studio:studio", "Work on what a model says, in the browser."),
     "retarget": ("facesynth.cli.retarget:retarget", "Put motion on any head, from a few frames posed by hand."),
     "emotion": ("facesynth.cli.emotion:emotion", "Hear the emotion in a voice."),
     "tune": ("facesynth.cli.tune:tune", "Search a method's settings on held-out sentences."),

@@ -1,0 +1,1 @@
+"""A workbench in the browser: what `speak` does, seen and changed phone by phone. No algorithm is here."""

@@ -1,0 +1,85 @@
+"""A take as the plain files that `speak` takes, and the request and the command line that say the same."""
+
+import csv
+import io
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from facesynth.atomic import write_text
+from facesynth.corpus.journal import parse_node
+from facesynth.inference.errors import unknown
+from facesynth.methods.capabilities import Capabilities
+from facesynth.speech.emotions import write_emotions
+from facesynth.speech.textgrid import write_textgrid
+from facesynth.stage.request import Part, Request
+from facesynth.studio.document import Document, Take
+
+PHONES, EMOTIONS, CONSTRAINTS = "phones.TextGrid", "emotions.csv", "constraints.csv"
+OF_REQUEST = ("seed", "mouth", "head", "eyes")
+"""What of `Request` a take may ask for, beside the model's own options."""
+PINS, NODES = "constraints", "edits"
+"""Own options of models that take nodes from a person: which must be used, and which were removed or drawn."""
+
+
+def write_take(folder: Path, take: Take) -> None:
+    """Write what `speak` reads of a take; what says the same already stays as it is."""
+    write_textgrid(folder / PHONES, take.phone_track(), take.words)
+    write_emotions(folder / EMOTIONS, take.emotion_track())
+    write_text(folder / CONSTRAINTS, _constraints(take))
+
+
+def write_edits(path: Path, document: Document) -> None:
+    """Write which nodes were drawn and removed, as a corpus keeps its edits."""
+    drawn = [{"op": "add", "phone": node.phone, "emotion": node.emotion, "frames": node.frames} for node in document.drawn]
+    removed = [{"op": "remove", "node": node} for node in document.removed]
+    write_text(path, "".join(json.dumps(edit, ensure_ascii=False) + "\n" for edit in [*drawn, *removed]))
+
+
+def own_options(take: Take, model: Capabilities) -> dict[str, Any]:
+    """The model's own options that a take asks for by a value, checked."""
+    asked = {name: value for name, value in take.options if name not in OF_REQUEST}
+    known = {option.name: option for option in model.options if option.type is not Path}
+    for name in asked:
+        if name not in known:
+            raise unknown(f"option of {model.name}", name, (*OF_REQUEST, *known))
+    return {name: known[name].checked(value) for name, value in asked.items()}
+
+
+def request_of(take: Take, folder: Path, edits: Path | None, model: Capabilities) -> Request:
+    """What is asked of `speak` for the files of a take."""
+    own: dict[str, Any] = dict(own_options(take, model))
+    if take.pins and model.option(PINS):
+        own[PINS] = folder / CONSTRAINTS
+    if edits is not None and model.option(NODES):
+        own[NODES] = edits
+    return Request(phones=folder / PHONES, emotions=folder / EMOTIONS, own=own, **of_request(take))
+
+
+def of_request(take: Take) -> dict[str, Any]:
+    """Fields of `Request` that a take asks for by a value."""
+    asked = {name: value for name, value in take.options if name in OF_REQUEST}
+    return {name: Part.of(str(value)) if name in ("head", "eyes") else value for name, value in asked.items()}
+
+
+def command_line(model: Path, sound: Path, request: Request, take: Take, outputs: Sequence[Path]) -> str:
+    """The same on the command line."""
+    words = ["facesynth", "speak", str(model), str(sound), "--phones", str(request.phones), "--emotions", str(request.emotions)]
+    words += _flags(request.own)
+    words += _flags({name: value for name, value in take.options if name in OF_REQUEST})
+    words += [word for output in outputs for word in ("-o", str(output))]
+    return shlex.join(words)
+
+
+def _flags(values: Mapping[str, Any]) -> list[str]:
+    return [word for name, value in values.items() for word in ("--" + name.replace("_", "-"), str(value))]
+
+
+def _constraints(take: Take) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("phone_index", "utterance_id", "phone_number"))
+    writer.writerows((pin.phone, *parse_node(pin.node)) for pin in take.pins)
+    return text.getvalue()

@@ -1,0 +1,197 @@
+"""What all windows of one studio share: the project, the corpus, the model, and what runs."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.speech import EmotionTrack, Speech
+from facesynth.methods.registry import known_capabilities, load, method_class
+from facesynth.speech.hearing import hear
+from facesynth.stage.performance import OUTPUTS
+from facesynth.studio.document import first_take, take_facts
+from facesynth.studio.jobs import Job, Jobs
+from facesynth.studio.library import Signature, corpus_facts, differing, recorded, signature
+from facesynth.studio.messages import project_facts
+from facesynth.studio.performing import Performing, Shown, model_facts
+from facesynth.studio.project import Kept, Project
+from facesynth.studio.speak_files import command_line, request_of
+
+LOOK_EVERY_S = 2.0
+"""Between looks at the disk."""
+Result = TypeVar("Result")
+
+
+class Window(Protocol):
+    """A browser window that is told what changes."""
+
+    async def tell(self, message: dict[str, Any]) -> None:
+        """Send it a message."""
+        ...
+
+    def refresh(self, kept: Kept) -> None:
+        """What it shows may have changed."""
+        ...
+
+
+class Studio:
+    """One project, one corpus, one model (if there is one), any number of windows."""
+
+    def __init__(self, project: Project, corpus: Path, model: Path | None, performing: Performing | None) -> None:
+        self.project, self.corpus, self.model, self.performing = project, Corpus.open(corpus), model, performing
+        self.windows: set[Window] = set()
+        self.jobs = Jobs(self._tell_job)
+        self._thread = ThreadPoolExecutor(1, "studio")
+        self._seen: Signature = signature(self.corpus.path, model)
+
+    async def away(self, work: Callable[..., Result], *arguments: Any) -> Result:
+        """What takes long, off the thread that answers."""
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work, *arguments)
+
+    async def tell_all(self, message: dict[str, Any]) -> None:
+        """Every window."""
+        await asyncio.gather(*(window.tell(message) for window in list(self.windows)))
+
+    async def change(self, do: str, arguments: dict[str, Any], base: int | None) -> Kept:
+        """Make and keep a change; every window is told."""
+        kept = self.project.change(do, arguments, base)
+        await self.tell_all({"kind": "project", **project_facts(self.project, kept.lines)})
+        for window in list(self.windows):
+            window.refresh(kept)
+        return kept
+
+    def facts(self) -> dict[str, Any]:
+        """Everything a new window must know."""
+        model = model_facts(self.performing.model, self.model) if self.performing and self.model else None
+        facts: dict[str, Any] = {
+            "kind": "all",
+            "project": project_facts(self.project),
+            "corpus": corpus_facts(self.corpus),
+            "model": model,
+        }
+        facts |= {
+            "corpus": corpus_facts(self.corpus),
+            "outputs": OUTPUTS,
+            "methods": mouths(),
+            "jobs": [job.facts() for job in self.jobs.known],
+        }
+        return {**facts, "folder": str(self.project.folder)}
+
+    def require_performing(self) -> Performing:
+        """The model's; FacesynthError without one."""
+        if self.performing is None:
+            raise FacesynthError("there is no model yet: train one on the page of the corpus, or start the studio with one")
+        return self.performing
+
+    async def show(self, line: str, take: str) -> Shown:
+        """The whole face of a take as it is."""
+        document = self.project.document
+        found = document.line(line)
+        work = self.require_performing().whole
+        return await self.away(work, self.project.sound(line), document, found, found.take(take))
+
+    async def show_recording(self, utterance: str) -> Shown:
+        """The motion that was recorded with an utterance, on the head."""
+        performing = self.require_performing()
+
+        def shown() -> Shown:
+            found, _ = recorded(self.corpus, utterance)
+            return performing.of_motion(found.motion, found.speech)
+
+        return await self.away(shown)
+
+    async def add_utterance(self, utterance: str, base: int | None) -> str:
+        """A line of what an utterance says; gives its name."""
+        found, words = await self.away(recorded, self.corpus, utterance)
+        await self._add_line(utterance, found.speech, words, utterance, base)
+        return utterance
+
+    async def add_sound(self, name: str, path: Path, text: str | None) -> str:
+        """A line of a sound that somebody brought; its phones are found as `speak` finds them."""
+        emotions = self.performing.model.emotions if self.performing else self.corpus.emotions
+        try:
+            heard = await self.away(lambda: hear(path, text=text, emotion=emotions[0]))
+        except FacesynthError as error:
+            raise FacesynthError(str(error).replace(str(path), path.name)) from None
+        await self._add_line(name, heard.speech, heard.words, "", None)
+        await self.tell_all({"kind": "note", "lines": list(heard.warnings)})
+        return name
+
+    def export(self, line: str, take: str, suffixes: list[str]) -> Job:
+        """Let the command line speak the take's files into files of the project."""
+        performing, folder = self.require_performing(), self.project.folder
+        if not suffixes or not set(suffixes) <= set(OUTPUTS):
+            raise FacesynthError(f"what can be exported is {', '.join(OUTPUTS)}; got {', '.join(suffixes) or 'nothing'}")
+        said = self.project.document.line(line).take(take)
+        edited = bool(self.project.document.removed or self.project.document.drawn)
+        edits = folder / "edits.jsonl" if edited else None
+        request = request_of(said, self.project.take_folder(line, take), edits, performing.model.capabilities)
+        outputs = [folder / "exports" / f"{line}-{take}{suffix}" for suffix in suffixes]
+        command = command_line(self._model_path(), self.project.sound(line), request, said, outputs)
+        return self.jobs.start(f"export {line}, take {take}", command)
+
+    def train(self, method: str) -> Job:
+        """Let the command line learn a model of the corpus, and use it when it is there."""
+        path = self.project.folder / "models" / f"{method_class(method).name}.safetensors"
+        path.parent.mkdir(exist_ok=True)
+
+        async def use(_job: Job) -> None:
+            await self.use_model(path)
+
+        return self.jobs.start(f"train {method}", ["train", method, str(self.corpus.path), "-o", str(path)], use)
+
+    async def use_model(self, path: Path) -> None:
+        """Speak with another model from now on; every window begins anew with it."""
+        self.performing = await self.away(lambda: Performing.of(load(path)))
+        self.model = path
+        self._seen = signature(self.corpus.path, path)
+        self.project.keep_facts(model=path)
+        await self.tell_all(self.facts())
+
+    def _model_path(self) -> Path:
+        if self.model is None:
+            raise FacesynthError("there is no model yet")
+        return self.model
+
+    async def watch(self) -> None:
+        """Tell, as long as the studio is open, when corpus or model changed on the disk."""
+        while True:
+            await asyncio.sleep(LOOK_EVERY_S)
+            now = signature(self.corpus.path, self.model)
+            if names := differing(self._seen, now):
+                self._seen = now
+                await self.reload(names)
+
+    async def reload(self, names: list[str]) -> None:
+        """Read the corpus anew and say why."""
+        try:
+            self.corpus = Corpus.open(self.corpus.path)
+            await self.tell_all({"kind": "corpus", "changed": names, "corpus": corpus_facts(self.corpus)})
+        except FacesynthError as error:
+            await self.tell_all({"kind": "note", "lines": [f"the corpus changed on disk and cannot be read: {error}"]})
+
+    async def close(self) -> None:
+        """End what runs; everything was kept before."""
+        await self.jobs.close()
+        self._thread.shutdown(cancel_futures=True)
+        self.project.close()
+
+    async def _add_line(self, name: str, speech: Speech, words: Any, utterance: str, base: int | None) -> None:
+        emotions = self.require_performing().model.emotions if self.performing else self.corpus.emotions
+        track = speech.emotions
+        if not set(track.labels) <= set(emotions):
+            track = EmotionTrack.constant(emotions[0], speech.duration_s)
+        self.project.keep_sound(name, speech.audio, speech.sample_rate)
+        take = take_facts(first_take(speech.phones, words, track))
+        await self.change("add_line", {"name": name, "text": speech.text, "take": take, "utterance": utterance}, base)
+
+    async def _tell_job(self, job: Job) -> None:
+        await self.tell_all({"kind": "job", "job": job.facts()})
+
+
+def mouths() -> list[str]:
+    """Methods that can be trained to move a mouth, those that need least first."""
+    return [one.name for one in known_capabilities()[0] if one.part == "mouth"]
