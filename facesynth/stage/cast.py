@@ -55,14 +55,17 @@ class Cast:
 
     def motion(self, speech: Speech, request: Request, options: dict[str, Any]) -> Motion:
         """Of the mouth, at its own rate: with emotions added, or mapped to another, where that was asked for."""
-        motion = self.mouth.synthesize(self._said(speech), seed=request.seed, **options)
+        return self.finished(self.mouth.synthesize(self.said(speech), seed=request.seed, **options), speech, request)
+
+    def finished(self, motion: Motion, speech: Speech, request: Request) -> Motion:
+        """The mouth's motion with emotions added, or mapped to another, where that was asked for."""
         if self.expression is not None:
             motion = require(self.expression, Expressing).express(motion, speech, seed=request.seed)
         if self.mapper is not None and request.to_emotion is not None:
             motion = self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
         return motion
 
-    def _said(self, speech: Speech) -> Speech:
+    def said(self, speech: Speech) -> Speech:
         """What the mouth is to say: neutrally, where somebody else adds the emotions."""
         if self.expression is None:
             return speech

@@ -118,7 +118,7 @@ class HeadStage:
     def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Performance:
         """Put a mouth's motion on the head, with what moves head and eyes beside it, at the rate asked for."""
         asked = self.request
-        face = whole_face(cast, self._as_arkit(motion), speech, asked)
+        face = whole_face(cast, self.as_arkit(motion), speech, asked)
         animation = animate(
             face.motion,
             self.rig,
@@ -132,7 +132,7 @@ class HeadStage:
         skin = self._skin(face.motion, animation)
         return Performance(speech, face.motion, animation, self.own or self.rig, asked.size or SIZE, skin)
 
-    def _as_arkit(self, motion: Motion) -> Motion:
+    def as_arkit(self, motion: Motion) -> Motion:
         """Curves under own names as ARKit's, where a mapping says how and the head that is shown has not the same names."""
         own_names = motion.layout.kind == "curves" and not arkit_columns(motion.layout)
         known = self.own is not None and set(self.own.names) <= set(motion.layout.names)
