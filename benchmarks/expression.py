@@ -3,7 +3,8 @@
 python benchmarks/expression.py CORPUS/ [seed]     (sentences in neutral and in emotions, as the built-in performer has them)
 
 The mouth is eFASE in neutral at the timing of the recorded emotional sentence. To its motion is added: nothing, the mean
-difference of the emotion, an expression grown from patches, or the emotion map by radial basis functions of the anime graph.
+difference of the emotion, an expression (as in the dissertation; only what phones let expect; that with variety, which is the
+default), or the emotion map by radial basis functions of the anime graph. Each utterance draws with a seed of its own.
 """
 
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.config import load_config
 from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.emotion_recognition import EmotionRecogniser
@@ -26,36 +28,43 @@ from facesynth.methods.anime_graph.report import unit_cube_rms
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.expression.method import Expression, differences_of
 
-INTENSITIES = (0.0, 0.25, 0.5, 0.75, 1.0)
-Row = Callable[[Utterance, Motion], Motion]
-"""From a recorded utterance and its neutral rendering to a motion in the utterance's emotion."""
+INTENSITIES = (0.0, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
+CONFIGS = Path(__file__).parents[1] / "configs"
+Row = Callable[[Utterance, Motion, int], Motion]
+"""From a recorded utterance, its neutral rendering and a seed to a motion in the utterance's emotion."""
 
 
 def main(path: Path, seed: int = 0) -> None:
     corpus = Corpus.open(path)
     train, test = corpus.split(seed)
-    space, mouth, maps = Expression().fit(train), Efase().fit(train), AnimeGraph().fit(train)
+    space, whole = (Expression.from_config(load_config(CONFIGS / f"expression{kind}.yaml")).fit(train) for kind in ("", "_paper"))
+    expected = Expression(variety=0.0).fit(train)
+    mouth, maps = Efase().fit(train), AnimeGraph().fit(train)
     recogniser = EmotionRecogniser.fit(train)
     said = [u for u in test if u.emotion in space.facts["expressions"]]
     neutral = [mouth.synthesize(in_emotion(u.speech, NEUTRAL)) for u in said]
     print(f"{corpus.performer}: {len(train)} utterances learned from, {len(said)} emotional ones of other sentences judged")
-    print(f"eigenspace of {space.basis.shape[1]} dimensions: {space.facts['variance']:.1%} of the variance (paper: 86.5 %)")
+    for model in (whole, space):
+        print(f"eigenspace of {model.basis.shape[1]} dimensions: {model.facts['variance']:.1%} of the variance")
+    print(f"phones tell {space.facts['told_by_phones']:.1%} of the variance within emotions")
     print(f"{'':34s} {'unit cube':>10s} {'recognised':>11s} {'upper face':>11s} {'lips':>6s}")
     means = mean_differences(train)
     rows: dict[str, Row] = {
-        "neutral": lambda u, motion: motion,
-        "mean difference": lambda u, motion: plus(motion, means[u.emotion]),
-        "expression": lambda u, motion: space.express(motion, u.speech, seed=seed),
-        "map by radial basis functions": lambda u, motion: maps.map_along(motion, in_emotion(u.speech, NEUTRAL), u.emotion),
-        "eFASE in the emotion": lambda u, motion: mouth.synthesize(u.speech),
+        "neutral": lambda u, motion, _: motion,
+        "mean difference": lambda u, motion, _: plus(motion, means[u.emotion]),
+        "expression": lambda u, motion, drawn: space.express(motion, u.speech, seed=drawn),
+        "expected by the phones alone": lambda u, motion, _: expected.express(motion, u.speech),
+        "as in the dissertation": lambda u, motion, drawn: whole.express(motion, u.speech, seed=drawn),
+        "map by radial basis functions": lambda u, motion, _: maps.map_along(motion, in_emotion(u.speech, NEUTRAL), u.emotion),
+        "eFASE in the emotion": lambda u, motion, _: mouth.synthesize(u.speech),
     }
     print(f"{'recorded':34s} {'':10s} {np.mean([recogniser.recognise(u.motion) == u.emotion for u in said]):11.2f}")
     for name, row in rows.items():
-        told(name, [row(u, motion) for u, motion in zip(said, neutral, strict=True)], said, recogniser)
+        told(name, [row(u, motion, seed + n) for n, (u, motion) in enumerate(zip(said, neutral, strict=True))], said, recogniser)
     for intensity in INTENSITIES:
         made = [
-            space.express(motion, in_emotion(u.speech, u.emotion, intensity), seed=seed)
-            for u, motion in zip(said, neutral, strict=True)
+            space.express(motion, in_emotion(u.speech, u.emotion, intensity), seed=seed + n)
+            for n, (u, motion) in enumerate(zip(said, neutral, strict=True))
         ]
         told(f"expression at {intensity:g}", made, said, recogniser)
         if intensity == 0:
@@ -66,7 +75,7 @@ def main(path: Path, seed: int = 0) -> None:
 def told(name: str, made: list[Motion], said: list[Utterance], recogniser: EmotionRecogniser) -> None:
     layout = said[0].motion.layout
     pairs = [(motion, u.motion) for motion, u in zip(made, said, strict=True)]
-    near = np.mean([unit_cube_rms(a.frames[whole(b)], b.frames[whole(b)], layout) for a, b in pairs])
+    near = np.mean([unit_cube_rms(a.frames[present(b)], b.frames[present(b)], layout) for a, b in pairs])
     right = np.mean([recogniser.recognise(motion) == u.emotion for motion, u in zip(made, said, strict=True)])
     upper, lips = (
         np.mean([energy_ratio(part(a, points), part(b, points)) for a, b in pairs])
@@ -75,7 +84,7 @@ def told(name: str, made: list[Motion], said: list[Utterance], recogniser: Emoti
     print(f"{name:34s} {near:10.4f} {right:11.2f} {upper:11.2f} {lips:6.2f}", flush=True)
 
 
-def whole(motion: Motion) -> NDArray[np.bool_]:
+def present(motion: Motion) -> NDArray[np.bool_]:
     """[T] frames in which nothing is missing."""
     return np.asarray(np.isfinite(motion.frames).all(axis=1))
 

@@ -17,13 +17,15 @@ def expression_content(model: Expression) -> Content:
     basis = np.ascontiguousarray(model.basis.cpu().numpy().T)
     return Content(
         graphs=(decode_graph(basis, model.mean.cpu().numpy(), unit, model.fps, model.decode_array),),
-        settings={"expressions": list(parts.emotions), "patches": asdict(parts.settings)},
+        settings={"expressions": list(parts.emotions), "patches": asdict(parts.settings), "variety": parts.variety},
         latency=LATENCY,
         arrays={
             "rest": model.rest.cpu().numpy(),
+            "weights": model.weights.cpu().numpy(),
+            "constants": model.constants.cpu().numpy(),
             "signals": model.signals.cpu().numpy(),
             "starts": parts.starts.astype(np.int32),
             "owners": parts.owners.astype(np.int32),
         },
-        units={"rest": unit, "signals": f"principal components of {unit}"},
+        units={"rest": unit} | dict.fromkeys(("weights", "constants", "signals"), f"principal components of {unit}"),
     )

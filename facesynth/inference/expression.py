@@ -1,7 +1,11 @@
 """Expressions apart from speech: recorded signals of what an emotion adds to a neutral face, grown anew and added to any motion.
 
-Deng 2006, §5.2: the signals lie in an expression eigenspace of three dimensions. A new one is grown of pieces of those of an
-emotion (`patches`), scaled by how strongly it is felt at each moment, and added; lips that were shut are shut after it.
+Deng 2006, §5.2: the signals lie in an expression eigenspace. A new one is grown of pieces of those of an emotion (`patches`),
+scaled by how strongly it is felt at each moment, and added; lips that were shut are shut after it.
+
+Unlike in the dissertation, what phones tell of a signal is not left to chance. A signal is s = E(s | phones) + r, the
+expectation linear in the phones around a moment and in the nearness of the beginning and the end (`phone_context`); only the
+remainder r is grown from pieces of recorded remainders. With expectations of zero the signals are grown whole.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,7 +26,8 @@ from .graphs import Graph
 from .layout import Layout
 from .motion import Motion
 from .patches import Growth, PatchSettings, PatchTexture
-from .speech import NEUTRAL, Speech
+from .phone_context import context_of
+from .speech import NEUTRAL, PhoneTrack, Speech
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -39,13 +44,19 @@ class Parts:
     """Those that were recorded beside neutral."""
     rest: Floats
     """[C] a neutral pose."""
+    weights: Floats
+    """[E, CONTEXT, D] of what is expected of each emotion's signals by the phones; zeros where nothing is."""
+    constants: Floats
+    """[E, D] the same, whatever is said."""
     signals: Floats
-    """[F, D] recorded signals, one recording after the other."""
+    """[F, D] what recorded signals have beyond that, one recording after the other."""
     starts: Ints
     """[R] first frame of each recording."""
     owners: Ints
     """[R] the emotion of each."""
     settings: PatchSettings
+    variety: float
+    """Share of what is grown that is added to what is expected."""
     decode: Callable[[NDArray[np.float32]], NDArray[np.float32]]
     """Signals [T, D] to what they add to frames [T, C]."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
@@ -65,11 +76,15 @@ class Expression:
         return {emotion: self._texture(number) for number, emotion in enumerate(self.parts.emotions)}
 
     def grow(self, emotion: str, count: int, *, seed: int = 0) -> Growth:
-        """A new signal [count, D] of an emotion, at the model's rate, and how it came about."""
-        if emotion not in self.textures:
-            raise unknown("emotion", emotion, self.parts.emotions)
-        number = self.parts.emotions.index(emotion)
+        """What a new signal [count, D] of an emotion has beyond its expectation, at the model's rate, and how it came about."""
+        number = self._number(emotion)
         return self.textures[emotion].grow(count, np.random.default_rng([checked_seed(seed), number]))
+
+    def signal(self, emotion: str, phones: PhoneTrack, count: int, *, seed: int = 0) -> Floats:
+        """[count, D] a new signal of an emotion while phones are said, at the model's rate."""
+        number = self._number(emotion)
+        expected = context_of(phones, count, self.fps) @ self.parts.weights[number] + self.parts.constants[number]
+        return expected + self.parts.variety * self.grow(emotion, count, seed=seed).frames
 
     def express(self, motion: Motion, speech: Speech, *, seed: int = 0) -> Motion:
         """A motion of the learned layout, of any method, with the emotions of speech as strong as their intensities say.
@@ -80,11 +95,10 @@ class Expression:
         frames = motion.frames.astype(np.float64)
         added = np.zeros_like(frames)
         for emotion in sorted(set(speech.emotions.labels) - {NEUTRAL}):
-            if emotion not in self.parts.emotions:
-                raise unknown("emotion", emotion, self.emotions)
+            self._number(emotion)
             amount = felt_over(speech.emotions, emotion, motion, speech.emotions.intensities)
             if amount.max(initial=0) > 0:
-                added += amount[:, None] * self._signal(emotion, len(motion), motion.fps, seed)
+                added += amount[:, None] * self._added(emotion, motion, speech.phones, seed)
         changed = frames + added
         if motion.layout.kind == "curves":
             changed = np.where(added == 0, frames, np.clip(changed, 0, 1))
@@ -97,11 +111,17 @@ class Expression:
         still = Motion(np.tile(self.parts.rest.astype(np.float32), (count, 1)), self.fps, self.layout)
         return self.express(still, speech, seed=seed)
 
-    def _signal(self, emotion: str, count: int, fps: float, seed: int) -> Floats:
-        """[count, C] what a new signal adds, at another rate."""
-        own = int(np.ceil(count * self.fps / fps)) + 1
-        added = self.parts.decode(self.grow(emotion, own, seed=seed).frames.astype(np.float32)).astype(np.float64)
-        return at_rate(added, self.fps, fps, np.arange(count, dtype=np.float64) * (self.fps / fps))
+    def _added(self, emotion: str, motion: Motion, phones: PhoneTrack, seed: int) -> Floats:
+        """[T, C] what a new signal adds, at the motion's rate."""
+        share = self.fps / motion.fps
+        signal = self.signal(emotion, phones, int(np.ceil(len(motion) * share)) + 1, seed=seed)
+        added = self.parts.decode(signal.astype(np.float32)).astype(np.float64)
+        return at_rate(added, self.fps, motion.fps, np.arange(len(motion), dtype=np.float64) * share)
+
+    def _number(self, emotion: str) -> int:
+        if emotion not in self.parts.emotions:
+            raise unknown("emotion", emotion, self.emotions)
+        return self.parts.emotions.index(emotion)
 
     def _texture(self, number: int) -> PatchTexture:
         stops = np.append(self.parts.starts[1:], len(self.parts.signals))
@@ -127,10 +147,13 @@ def load_expression(folder: Folder, threads: int) -> Expression:
             fps=float(manifest["fps"]),
             emotions=tuple(folder.settings["expressions"]),
             rest=arrays["rest"].astype(np.float64),
+            weights=arrays["weights"].astype(np.float64),
+            constants=arrays["constants"].astype(np.float64),
             signals=arrays["signals"].astype(np.float64),
             starts=arrays["starts"].astype(np.int64),
             owners=arrays["owners"].astype(np.int64),
             settings=PatchSettings(**folder.settings["patches"]),
+            variety=float(folder.settings["variety"]),
             decode=lambda signals: decode(coordinates=signals[None])[0][0],
             manifest=manifest,
         )

@@ -81,7 +81,7 @@ def eigenspace(material: Material) -> Finding:
     """§5.2.2: how much of expressive motion three dimensions hold."""
     what = "variance of the expression eigenspace in 3 dimensions"
     try:
-        model = Expression().fit(material.train)
+        model = Expression(components=3).fit(material.train)
     except FacesynthError as reason:
         return not_available("§5.2.2", what, "86.5 %", str(reason))
     return Finding("§5.2.2", what, "86.5 %", f"{model.facts['variance']:.1%}", False, material.unlike)

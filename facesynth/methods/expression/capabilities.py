@@ -4,10 +4,9 @@ from facesynth.methods.capabilities import Capabilities, Expressing
 
 CAPABILITIES = Capabilities(
     "expression",
-    "Deng 2006: recorded signals of what an emotion adds to a neutral face, grown anew and added to any method's motion",
+    "Deng 2006: what an emotion adds to a neutral face, as phones tell it and varied as recorded; added to any method's motion",
     home="facesynth.methods.expression.method",
     part="expression",
     abilities=frozenset({Expressing}),
-    hears_phones=False,
     exporter="facesynth.export.expression:expression_content",
 )

@@ -22,6 +22,8 @@ class Difference:
 
     emotion: str
     sentence: str
+    phones: PhoneTrack
+    """Of the neutral recording."""
     frames: Floats
     """[T, C] at the neutral recording's timing; NaN where either has a gap."""
 
@@ -64,7 +66,7 @@ def difference_of(neutral: Utterance, felt: Utterance) -> Difference:
     warped = there[low] * (1 - share) + there[np.minimum(low + 1, len(other) - 1)] * share
     frames = warped - own.frames
     frames[:, lid_columns(own.layout)] = np.where(np.isfinite(frames).all(axis=1), 0.0, np.nan)[:, None]
-    return Difference(felt.emotion, felt.sentence, frames)
+    return Difference(felt.emotion, felt.sentence, neutral.speech.phones, frames)
 
 
 def lid_columns(layout: Layout) -> NDArray[np.int64]:

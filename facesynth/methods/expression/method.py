@@ -12,21 +12,25 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.expression import Expression as Runtime
 from facesynth.inference.expression import Parts, patch_settings
 from facesynth.inference.motion import Motion
+from facesynth.inference.phone_context import CONTEXT, context_of
 from facesynth.inference.speech import NEUTRAL, Speech
 from facesynth.methods.expression.capabilities import CAPABILITIES
 from facesynth.methods.expression.differences import Difference, Floats, difference_of, says_the_same, twins, whole_runs
 from facesynth.methods.learn.frames import PoseSum, mean_pose
+from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
 from facesynth.motion.pca import Pca
 
+DRAWN = 0.05
+"""How strongly the weights of phones are drawn to zero, as a share of the mean variance of what they weigh."""
 FEWEST = 2
 """Sentences of an emotion that are needed beside their neutral twins."""
 
 
 @register(CAPABILITIES)
 class Expression(Method):
-    """Adds recorded expressive motion, grown anew by patch-based sampling, to the neutral motion of any method (Deng 2006, §5.2).
+    """Adds expressive motion to the neutral motion of any method (Deng 2006, §5.2): what phones let expect, and variety about it.
 
     Parameters
     ----------
@@ -36,6 +40,12 @@ class Expression(Method):
         Length of a patch and of the zone in which it must fit what is there, s (30 and 5 frames of 120 Hz).
     tolerance : float
         epsilon of eq. 3.4: how far a fitting patch may lie from what is there.
+    context : bool
+        Whether what phones tell of a signal is learned, and only the remainder is grown; the dissertation grows all.
+    variety : float
+        Share of what is grown that is added; the dissertation's is 1.
+    kept_s : float
+        Of each emotion so many seconds, spread over the recordings, are kept to grow from; models stay small.
     """
 
     rest: Tensor
@@ -44,23 +54,34 @@ class Expression(Method):
     """[C] the mean of all signals."""
     basis: Tensor
     """[C, D] the expression eigenspace."""
+    weights: Tensor
+    """[E, CONTEXT, D] of the expectation of each emotion's signals by the phones."""
+    constants: Tensor
+    """[E, D] the same, whatever is said."""
     signals: Tensor
-    """[F, D] recorded signals in it."""
+    """[F, D] what recorded signals have beyond their expectation."""
     starts: Tensor
     """[R] first frame of each recording."""
     owners: Tensor
     """[R] number of each recording's emotion in `facts["expressions"]`."""
 
     def __init__(
-        self, components: float = 3, patch_s: float = 0.25, boundary_s: float = 5 / 120, tolerance: float = 0.03
+        self,
+        components: float = 0.995,
+        patch_s: float = 0.5,
+        boundary_s: float = 1 / 12,
+        tolerance: float = 0.5,
+        context: bool = True,
+        variety: float = 0.4,
+        kept_s: float = 40.0,
     ) -> None:
         super().__init__()
-        if components <= 0 or not 0 < boundary_s < patch_s or tolerance < 0:
+        if components <= 0 or not 0 < boundary_s < patch_s or min(tolerance, variety) < 0 or kept_s <= 0:
             raise FacesynthError(
-                "expression wants positive components, 0 < boundary_s < patch_s and a tolerance that is not negative; got "
+                "expression wants positive components and kept_s, 0 < boundary_s < patch_s, nothing negative; got "
                 + ", ".join(f"{name}={value:g}" for name, value in self.config.items())
             )
-        for name in ("rest", "mean", "basis", "signals", "starts", "owners"):
+        for name in ("rest", "mean", "basis", "weights", "constants", "signals", "starts", "owners"):
             self.register_buffer(name, torch.zeros(0))
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
@@ -69,15 +90,15 @@ class Expression(Method):
         self.learned_from(corpus)
         differences, unlike = differences_of(corpus)
         emotions, left_out = expressions_of(differences, corpus, unlike)
-        runs = [(emotions.index(d.emotion), run) for d in differences if d.emotion in emotions for run in whole_runs(d.frames)]
-        frames = np.concatenate([run for _, run in runs])
-        pca = Pca.fit(frames, self.config["components"])
-        self._keep(neutral_pose(corpus), pca, [run for _, run in runs], np.array([owner for owner, _ in runs]))
+        learned = [d for d in differences if d.emotion in emotions]
+        pca = Pca.fit(np.concatenate([run for d in learned for run in whole_runs(d.frames)]), self.config["components"])
+        told = self._keep(neutral_pose(corpus), pca, emotions, learned)
         self.emotions = (NEUTRAL, *emotions)
         self.facts = {
             "expressions": list(emotions),
             "sentences": {e: len({d.sentence for d in differences if d.emotion == e}) for e in emotions},
             "variance": float(pca.variance_ratio.sum()),
+            "told_by_phones": told,
             "other_phones": unlike,
             "emotions_left_out": left_out,
         }
@@ -101,10 +122,13 @@ class Expression(Method):
                 fps=self.fps,
                 emotions=tuple(self.facts["expressions"]),
                 rest=self.rest.double().cpu().numpy(),
+                weights=self.weights.double().cpu().numpy(),
+                constants=self.constants.double().cpu().numpy(),
                 signals=self.signals.double().cpu().numpy(),
                 starts=self.starts.long().cpu().numpy(),
                 owners=self.owners.long().cpu().numpy(),
                 settings=patch_settings(self.fps, *(self.config[name] for name in ("patch_s", "boundary_s", "tolerance"))),
+                variety=float(self.config["variety"]),
                 decode=self.decode_array,
             )
         )
@@ -114,12 +138,51 @@ class Expression(Method):
         added = self.mean + torch.from_numpy(signals).to(self.basis) @ self.basis.T
         return np.asarray(added.cpu().numpy())
 
-    def _keep(self, rest: Floats, pca: Pca, runs: list[Floats], owners: NDArray[np.int64]) -> None:
+    def _keep(self, rest: Floats, pca: Pca, emotions: tuple[str, ...], learned: list[Difference]) -> float:
+        """Learn what phones tell of the signals and keep the remainders; the share of variance within emotions that is told."""
+        signals = [pca.encode(torch.from_numpy(d.frames.astype(np.float32))).numpy() for d in learned]
+        heard = [context_of(d.phones, len(d.frames), self.fps) for d in learned]
+        owners = np.array([emotions.index(d.emotion) for d in learned])
+        weights, constants = self._expectations(heard, signals, owners, len(emotions))
+        rests = [s - x @ weights[k] - constants[k] for s, x, k in zip(signals, heard, owners, strict=True)]
+        runs = [(k, run) for k in range(len(emotions)) for run in self._spread(rests, owners == k)]
         self.rest = torch.from_numpy(rest.astype(np.float32))
         self.mean, self.basis = pca.mean, pca.basis
-        self.signals = pca.encode(torch.from_numpy(np.concatenate(runs).astype(np.float32)))
-        self.starts = torch.from_numpy(np.cumsum([0, *(len(run) for run in runs[:-1])]))
-        self.owners = torch.from_numpy(owners)
+        self.weights, self.constants = (torch.from_numpy(array.astype(np.float32)) for array in (weights, constants))
+        self.signals = torch.from_numpy(np.concatenate([run for _, run in runs]).astype(np.float32))
+        self.starts = torch.from_numpy(np.cumsum([0, *(len(run) for _, run in runs[:-1])]))
+        self.owners = torch.from_numpy(np.array([owner for owner, _ in runs]))
+        return _told(signals, rests, owners) if self.config["context"] else 0.0
+
+    def _spread(self, rests: list[Floats], mine: NDArray[np.bool_]) -> list[Floats]:
+        """About `kept_s` of the runs without gaps of one emotion, every so many of them."""
+        runs = [run for k in np.flatnonzero(mine) for run in whole_runs(rests[k])]
+        step = sum(map(len, runs)) / (self.config["kept_s"] * self.fps)
+        return runs[:: max(1, int(np.ceil(step)))]
+
+    def _expectations(
+        self, heard: list[Floats], signals: list[Floats], owners: NDArray[np.int64], count: int
+    ) -> tuple[Floats, Floats]:
+        """Weights [E, CONTEXT, D] and constants [E, D] from contexts [T, CONTEXT] to signals [T, D]; zeros for none."""
+        width = signals[0].shape[1]
+        weights, constants = np.zeros((count, CONTEXT, width)), np.zeros((count, width))
+        for number in range(count if self.config["context"] else 0):
+            sums = Moments.zero(CONTEXT, width)
+            for x, y in ((heard[k], signals[k]) for k in np.flatnonzero(owners == number)):
+                whole = np.isfinite(y).all(axis=1)
+                sums.add(x[whole], y[whole])
+            ((weights[number], constants[number]),) = sums.solutions([DRAWN])
+        return weights, constants
+
+
+def _told(signals: list[Floats], rests: list[Floats], owners: NDArray[np.int64]) -> float:
+    """Share of the variance of signals [T, D] within each emotion that the remainders do not have."""
+
+    def within(tracks: list[Floats]) -> float:
+        kinds = [np.concatenate([tracks[k] for k in np.flatnonzero(owners == number)]) for number in np.unique(owners)]
+        return float(sum(np.nanvar(kind, axis=0).sum() * len(kind) for kind in kinds))
+
+    return 1 - within(rests) / max(within(signals), 1e-12)
 
 
 def differences_of(corpus: Corpus) -> tuple[list[Difference], int]:
