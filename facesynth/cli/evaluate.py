@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 @click.option("--folds", default=5, show_default=True, help="Splits by sentence.")
 @click.option("--given-folds", type=click.Path(path_type=Path), help="JSON of folds in place of drawn ones.")
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes of each fold.")
+@click.option(
+    "--minutes",
+    multiple=True,
+    type=click.FloatRange(0.01),
+    help="Each method also by so many minutes of each fold; may be repeated.",
+)
 @click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all.")
 @click.option(
     "--from-predictions", "stored", type=click.Path(path_type=Path), help="Judge METHOD/ID.npz of this folder; train nothing."
@@ -50,6 +56,7 @@ def evaluate(
     folds: int,
     given_folds: Path | None,
     train_minutes: float | None,
+    minutes: tuple[float, ...],
     test_limit: int | None,
     stored: Path | None,
     no_references: bool,
@@ -82,7 +89,7 @@ def evaluate(
     recordings = Corpus.open(corpus)
     for utterance_id in shown:
         recordings.record(utterance_id)
-    known, contestants = _contestants(methods, families, references=not no_references)
+    known, contestants = _contestants(methods, families, minutes, references=not no_references)
     splits: Sequence[Fold] | None = read_folds(given_folds, recordings) if given_folds else None
     if stored is None:
         if not methods and not families:
@@ -99,7 +106,13 @@ def evaluate(
 
 def _refuse_training() -> None:
     """UsageError where something was asked of a training that `--from-predictions` does without."""
-    names = {"methods": "METHOD", "folds": "--folds", "train_minutes": "--train-minutes", "test_limit": "--test-limit"}
+    names = {
+        "methods": "METHOD",
+        "folds": "--folds",
+        "train_minutes": "--train-minutes",
+        "minutes": "--minutes",
+        "test_limit": "--test-limit",
+    }
     source = click.get_current_context().get_parameter_source
     given = [shown for name, shown in names.items() if source(name) is click.core.ParameterSource.COMMANDLINE]
     if given:
@@ -108,14 +121,17 @@ def _refuse_training() -> None:
         )
 
 
-def _contestants(methods: Sequence[str], families: Sequence[Path], *, references: bool) -> tuple[list[Family], list[Contestant]]:
-    """Families, and every contestant: the named ones, the families' and the reference rows."""
-    from facesynth.evaluation.contestants import contestant, read_family
+def _contestants(
+    methods: Sequence[str], families: Sequence[Path], minutes: Sequence[float], *, references: bool
+) -> tuple[list[Family], list[Contestant]]:
+    """Families, and every contestant: the named ones, the families', the reference rows, and all but the families' by minutes."""
+    from facesynth.evaluation.contestants import by_minutes, contestant, read_family
     from facesynth.evaluation.contestants import references as reference_rows
 
     read = [read_family(path) for path in families]
-    named = [contestant(spec) for spec in methods] + [one for _, variants in read for one in variants]
-    return [family for family, _ in read], named + (reference_rows() if references else [])
+    named, known = [contestant(spec) for spec in methods], reference_rows() if references else []
+    less, again = by_minutes([*named, *known], minutes)
+    return [family for family, _ in read] + less, named + [one for _, variants in read for one in variants] + known + again
 
 
 def _result(

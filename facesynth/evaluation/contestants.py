@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +90,19 @@ def contestant(spec: str) -> Contestant:
     one = Contestant(Path(config).stem if config else name, name, settings)
     one.create()
     return one
+
+
+def by_minutes(contestants: Sequence[Contestant], minutes: Sequence[float]) -> tuple[list[Family], list[Contestant]]:
+    """Each contestant again with so many minutes of every fold to learn from; a family of each."""
+    families, variants = [], []
+    for one in contestants if minutes else ():
+        again = [replace(one, label=f"{one.label} {count:g} min", minutes=count) for count in sorted(set(minutes))]
+        places = tuple(sorted(set(minutes)))
+        families.append(
+            Family(f"{one.label} by the minutes that it learned from", tuple(v.label for v in again), "minutes", places, log=True)
+        )
+        variants += again
+    return families, variants
 
 
 def check_labels(contestants: Sequence[Contestant]) -> None:

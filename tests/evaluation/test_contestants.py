@@ -1,6 +1,6 @@
 import pytest
 
-from facesynth.evaluation.contestants import Contestant, check_labels, contestant, read_family, references
+from facesynth.evaluation.contestants import Contestant, by_minutes, check_labels, contestant, read_family, references
 from facesynth.inference.errors import FacesynthError
 
 
@@ -20,6 +20,16 @@ def test_what_decides_the_predictions_includes_defaults():
     assert Contestant("a", "lds").plain()["settings"]["features"] == 8
     assert Contestant("a", "lds", {"features": 4}).plain() != Contestant("a", "lds").plain()
     assert Contestant("a", "lds", speak={"noise": 0}).plain() != Contestant("a", "lds").plain()
+
+
+def test_each_method_learns_again_from_fewer_minutes():
+    families, variants = by_minutes([contestant("lds"), *references()], [5, 1, 5])
+    assert families[0].labels == ("lds 1 min", "lds 5 min")
+    assert families[0].values == (1, 5)
+    assert len(families) == 1 + len(references())
+    assert [one.minutes for one in variants[:2]] == [1, 5]
+    check_labels([contestant("lds"), *references(), *variants])
+    assert by_minutes([contestant("lds")], []) == ([], [])
 
 
 def test_every_shipped_family_is_sound(repository):
