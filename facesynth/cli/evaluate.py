@@ -129,9 +129,10 @@ def _contestants(
     from facesynth.evaluation.contestants import references as reference_rows
 
     read = [read_family(path) for path in families]
-    named, known = [contestant(spec) for spec in methods], reference_rows() if references else []
+    named, variants = [contestant(spec) for spec in methods], [one for _, variants in read for one in variants]
+    known = reference_rows([*named, *variants]) if references else []
     less, again = by_minutes([*named, *known], minutes)
-    return [family for family, _ in read] + less, named + [one for _, variants in read for one in variants] + known + again
+    return [family for family, _ in read] + less, named + variants + known + again
 
 
 def _result(

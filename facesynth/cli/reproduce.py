@@ -38,10 +38,12 @@ def reproduce(
     from facesynth.atomic import write_text
     from facesynth.corpus import Corpus
     from facesynth.evaluation.papers import reproduce as run
+    from facesynth.evaluation.report import require_drawing
     from facesynth.inference.errors import unknown
 
     if output and output.suffix not in TYPES:
         raise unknown("output type", output.suffix or str(output), TYPES)
+    require_drawing()
     result = run(paper, Corpus.open(corpus), train_minutes=train_minutes, test_limit=test_limit, seed=seed)
     plain = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     if output:

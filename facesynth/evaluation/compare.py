@@ -18,19 +18,23 @@ from facesynth.evaluation.jobs import Job, read_account, run_job
 from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.paired import Difference, compare_pairs
+from facesynth.evaluation.part_statistics import PART_COLUMNS
 from facesynth.evaluation.second_take import second_take
 from facesynth.evaluation.table import Column, Comparison, Row
 from facesynth.evaluation.tallies import Task, refuse_strangers, tally
 from facesynth.evaluation.variety import VARIETY
 from facesynth.evaluation.versions import versions
 from facesynth.inference.errors import FacesynthError
+from facesynth.methods.capabilities import Part
+from facesynth.methods.registry import capabilities_of
 from facesynth.progress import track
 
 FOLDS = "folds.json"
 PREDICTIONS = "predictions"
 MAIN = (
     "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
-    "diversity", "emotion_accuracy", "other_phones", "other_visemes", "train_s", "train_cpu_s", "rtf", "rtf_cpu", "model_mb",
+    "diversity", "emotion_accuracy", "other_phones", "other_visemes", "head_cca", "head_distance",
+    *(column.name for column in PART_COLUMNS), "train_s", "train_cpu_s", "rtf", "rtf_cpu", "model_mb",
 )  # fmt: skip
 """Columns of the short table; everything is in the CSV and the JSON."""
 OVERTAKEN = {"train_s": "train_cpu_s", "rtf": "rtf_cpu"}
@@ -76,7 +80,7 @@ class Evaluation:
 
     def main_columns(self) -> list[str]:
         """Columns of the short table: those of `MAIN` that some method has."""
-        scores = self.comparison.scores.values()
+        scores = [score for label, score in self.comparison.scores.items() if label != SECOND_TAKE]
         known = [name for name in MAIN if any(name in row and row[name].utterances for row in scores)]
         return [name for name in known if OVERTAKEN.get(name) not in known]
 
@@ -140,9 +144,12 @@ def judge_predictions(
     tested = corpus.subset(sorted(i for fold in folds for i in fold.test))
     judges = judges_of(corpus, folds, tested)
     reach = residual_reach(track(tested, "recorded movement", len(tested)))
-    tasks = [Task(corpus.path, corpus.ids, predictions, label, tested.ids, judges, reach) for label in (SECOND_TAKE, *labels)]
-    judged = list(spread(tally, tasks, workers, "judging"))
     accounts = {label: _accounts(predictions / label, len(folds)) for label in labels}
+    tasks = [
+        Task(corpus.path, corpus.ids, predictions, label, tested.ids, judges, reach, _part(accounts.get(label, ())))
+        for label in (SECOND_TAKE, *labels)
+    ]
+    judged = list(spread(tally, tasks, workers, "judging"))
     rows = [_with_costs(one.row, accounts.get(one.row.label, ()), one.costs) for one in judged]
     rows[0] = _explain_second_take(rows[0], corpus, tested)
     recorded = [pair for fold in folds for pair in judges[fold.test[0]].recorded(corpus.subset(fold.test))]
@@ -221,6 +228,12 @@ def _accounts(folder: Path, count: int) -> list[dict[str, Any]]:
     return [account for number in range(1, count + 1) if (account := read_account(folder / f"fold-{number}.json"))]
 
 
+def _part(accounts: Sequence[Mapping[str, Any]]) -> Part:
+    """What a method moves; of predictions made elsewhere, a mouth that may move the rest too."""
+    methods = {one["contestant"]["method"] for one in accounts if "contestant" in one}
+    return capabilities_of(methods.pop()).part if methods else "mouth"
+
+
 def _with_costs(row: Row, accounts: Sequence[Mapping[str, Any]], costs: Mapping[str, float]) -> Row:
     """Means over the folds; the largest for memory. Reasons say why predictions made elsewhere have none."""
     found = dict(costs)
@@ -239,4 +252,5 @@ def _columns(rows: Sequence[Row], tested: Corpus) -> tuple[Column, ...]:
     known += [Column(name, tested.layout.unit, "" if name == "diversity" else "low") for name in VARIETY]
     names = {column.name for column in known}
     own = list(dict.fromkeys(name for row in rows for name in row.values if name not in names))
-    return (*known, *(Column(name, "1", "1" if name == "join_jump" else "") for name in own), *COSTS)
+    moved = [column for column in PART_COLUMNS if any(column.name in row.costs for row in rows if row.label != SECOND_TAKE)]
+    return (*known, *(Column(name, "1", "1" if name == "join_jump" else "") for name in own), *moved, *COSTS)

@@ -13,7 +13,7 @@ from facesynth.config import load_config
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
-from facesynth.methods.registry import create, known_capabilities, method_class
+from facesynth.methods.registry import capabilities_of, create, known_capabilities, method_class
 from facesynth.methods.training import CPU, train
 
 SECOND_TAKE = "second take"
@@ -76,9 +76,15 @@ class Family:
     against movement."""
 
 
-def references() -> list[Contestant]:
-    """The rows that every table has beside the second take, without which no figure can be judged."""
-    return [Contestant(one.reference, one.name) for one in known_capabilities()[0] if one.reference]
+def references(contestants: Sequence[Contestant] = ()) -> list[Contestant]:
+    """The rows that every table has beside the second take, without which no figure can be judged.
+
+    Of the parts of the face that the contestants move; where none are given, of all.
+    """
+    parts = {capabilities_of(one.method).part for one in contestants}
+    parts |= {"mouth"} if "expression" in parts else set()
+    known = [one for one in known_capabilities()[0] if one.reference]
+    return [Contestant(one.reference, one.name) for one in known if not parts or one.part in parts]
 
 
 def contestant(spec: str) -> Contestant:

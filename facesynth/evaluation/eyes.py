@@ -117,6 +117,8 @@ def _correlations(gaze: Floats, head: Floats, fps: float) -> Floats:
 
 
 def _windows(signal: Floats, fps: float) -> Floats:
-    """[N, W, C] half-overlapping windows of a signal [T, C]."""
+    """[N, W, C] half-overlapping windows of a signal [T, C]; none of a shorter one."""
     width = round(WINDOW_S * fps)
+    if len(signal) < width:
+        return np.zeros((0, width, signal.shape[1]))
     return np.stack([signal[start : start + width] for start in range(0, len(signal) - width + 1, width // 2)])

@@ -25,6 +25,14 @@ def deng_error(synthesised: Motion, truth: Motion) -> float:
     return mean_present(distances(*paired_points(synthesised, truth)) ** 2)
 
 
+def deng_errors(synthesised: Motion, truth: Motion) -> Array:
+    """[T] the same of each frame, over the points that the truth has in it; NaN where it has none."""
+    squared = distances(*paired_points(synthesised, truth)) ** 2
+    seen = ~np.isnan(squared)
+    sums = np.where(seen, squared, 0.0).sum(axis=1)
+    return np.asarray(np.where(seen.any(axis=1), sums / np.maximum(seen.sum(axis=1), 1), np.nan))
+
+
 def unit_cube_rms(synthesised: Motion, truth: Motion) -> float:
     """RMS over the coordinates of each frame, mean over frames, of motions scaled into the unit cube (1).
 

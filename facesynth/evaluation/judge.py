@@ -15,10 +15,13 @@ from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.table import Row
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
+from facesynth.methods.capabilities import Part
 
 NAN = float("nan")
 MOST_LEARNED = 400
 """Utterances are enough to tell emotions apart."""
+APART: tuple[Part, ...] = ("head", "eyes")
+"""Parts that are moved alone: the face rests meanwhile, and is not judged."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +42,13 @@ class Judge:
             threshold = NAN
         return cls(threshold, recogniser_of(train))
 
-    def figures(self, utterance: Utterance, motion: Motion) -> Iterator[tuple[str, float, str]]:
-        """(metric, value, reason why it is NaN) of one utterance."""
+    def figures(self, utterance: Utterance, motion: Motion, part: Part = "mouth") -> Iterator[tuple[str, float, str]]:
+        """(metric, value, reason why it is NaN) of one utterance; part: what the method moves, a mouth moving the others too."""
         case = Case(motion, utterance.motion, utterance.speech.phones, self.closure_threshold)
         for metric in METRICS:
+            if part in APART and metric.part != part:
+                yield metric.name, NAN, moves_alone(part)
+                continue
             try:
                 yield metric.name, metric.measure(case), ""
             except UnavailableError as reason:
@@ -54,6 +60,11 @@ class Judge:
             return []
         whole = [u for u in test if not np.isnan(u.motion.frames).any(axis=1).all()]
         return [(u.emotion, self.recogniser.recognise(u.motion)) for u in whole]
+
+
+def moves_alone(part: Part) -> str:
+    """Why a figure is missing."""
+    return f"the method moves the {part} alone"
 
 
 def recogniser_of(train: Corpus) -> EmotionRecogniser | None:
@@ -77,15 +88,18 @@ class Tally:
         self.emotions: list[tuple[str, str]] = []
         self.count = 0
 
-    def add(self, judge: Judge, utterance: Utterance, motion: Motion) -> None:
-        """Judge one utterance."""
+    def add(self, judge: Judge, utterance: Utterance, motion: Motion, part: Part = "mouth") -> None:
+        """Judge one utterance of a method that moves a part."""
         self.count += 1
         try:
-            for name, value, reason in judge.figures(utterance, motion):
+            for name, value, reason in judge.figures(utterance, motion, part):
                 self.set(name, value, reason)
         except FacesynthError as error:
             raise FacesynthError(f"utterance {utterance.id!r} cannot be judged: {error}") from None
-        self._add_emotion(judge, utterance.emotion, motion)
+        if part in APART:
+            self.set("emotion_accuracy", NAN, moves_alone(part))
+        else:
+            self._add_emotion(judge, utterance.emotion, motion)
 
     def miss(self, reason: str) -> None:
         """Count an utterance for which there is no motion."""

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from facesynth.evaluation import dynamics, geometry, head, lips, timing, variety
+from facesynth.evaluation.part_statistics import PART_DEFINITIONS
 from facesynth.inference.errors import unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+from facesynth.methods.capabilities import Part
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Metric:
     """Raises UnavailableError where it has no value; its module's function of the same name is the definition."""
     definition: str = ""
     """What that function's docstring says."""
+    part: Part = "mouth"
+    """Of the face: whoever moves another part has no such figure."""
 
     def unit_in(self, layout_unit: str) -> str:
         """The unit with the layout's own in the place of `u`."""
@@ -41,7 +45,8 @@ class Metric:
 
 
 def _of_pair(name: str, unit: str, best: Literal["low", "high", "0", "1"], function: Callable[[Motion, Motion], float]) -> Metric:
-    return Metric(name, unit, best, lambda case: function(case.synthesised, case.truth), function.__doc__ or "")
+    part: Part = "head" if function.__module__ == head.__name__ else "mouth"
+    return Metric(name, unit, best, lambda case: function(case.synthesised, case.truth), function.__doc__ or "", part)
 
 
 METRICS: tuple[Metric, ...] = (
@@ -85,6 +90,7 @@ DEFINITIONS: Mapping[str, str] = {
     name: " ".join(text.split())
     for name, text in (
         *((one.name, one.definition) for one in METRICS),
+        *PART_DEFINITIONS.items(),
         *((function.__name__, function.__doc__ or "") for function in _OTHERS),
         (
             "emotion_accuracy",

@@ -8,14 +8,16 @@ from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.details import Details, DetailSums
 from facesynth.evaluation.dynamics import join_jump
-from facesynth.evaluation.judge import NAN, Judge, Tally
+from facesynth.evaluation.judge import APART, NAN, Judge, Tally
 from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.part_statistics import PartSums
 from facesynth.evaluation.predictions import Beside, load_prediction, read_beside, sample_paths
 from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Row
 from facesynth.evaluation.variety import VARIETY
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
+from facesynth.methods.capabilities import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,8 @@ class Task:
     """By utterance."""
     reach: float
     """Of the residual histogram, see `residual_reach`."""
+    part: Part = "mouth"
+    """What the method moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,24 +50,27 @@ class Judged:
 def tally(task: Task) -> Judged:
     """Every figure of every tested utterance; an utterance without a prediction has none, and the reason says so."""
     corpus, spent = Corpus.open(task.corpus).subset(task.known), list[Beside]()
-    figures, sums = Tally(), DetailSums(task.reach)
+    figures, sums, parts = Tally(), DetailSums(task.reach), PartSums()
     for utterance_id in task.tested:
         motion = read_motion(corpus, task.predictions, task.label, utterance_id)
         if motion is None:
             figures.miss(f"{task.label} has no prediction of some utterances")
             continue
         utterance = corpus[utterance_id]
-        figures.add(task.judges[utterance_id], utterance, motion)
-        sums.add(utterance, motion)
+        figures.add(task.judges[utterance_id], utterance, motion, task.part)
+        parts.add(utterance, motion)
+        if task.part not in APART:
+            sums.add(utterance, motion)
         if task.label == SECOND_TAKE:
             continue
         path = task.predictions / task.label / f"{utterance_id}.npz"
-        _add_variety(figures, path, motion, utterance, corpus)
+        if task.part not in APART:
+            _add_variety(figures, path, motion, utterance, corpus)
         if beside := read_beside(path):
             _add_own(figures, beside, motion)
             spent.append(beside)
     figures.explain(VARIETY, "no other motion of the same speech: the method draws none, or none lies beside the predictions")
-    return Judged(figures.row(task.label, {}), sums.details(), _rates(spent))
+    return Judged(figures.row(task.label, {}), sums.details(), _rates(spent) | parts.figures())
 
 
 def read_motion(corpus: Corpus, predictions: Path, label: str, utterance_id: str) -> Motion | None:

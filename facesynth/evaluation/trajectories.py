@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,11 +39,16 @@ def shown_channels(layout: Layout, frames: Array) -> list[tuple[str, int]]:
     ]
 
 
-def trajectory_figure(utterance: Utterance, motions: Mapping[str, Motion], colours: Mapping[str, str]) -> str:
-    """Position and velocity of two lip points, and the lip error, over time; a colour for each method."""
+def trajectory_figure(
+    utterance: Utterance,
+    motions: Mapping[str, Motion],
+    colours: Mapping[str, str],
+    channels: Sequence[tuple[str, int]] | None = None,
+) -> str:
+    """Position and velocity of two lip points, or of other (name, channel), and the lip error; a colour for each method."""
     truth = utterance.motion
     try:
-        channels = shown_channels(truth.layout, truth.frames.astype(np.float64))
+        channels = channels or shown_channels(truth.layout, truth.frames.astype(np.float64))
     except UnavailableError:
         return ""
     few = dict(list(motions.items())[:MOST_SHOWN])

@@ -28,6 +28,8 @@ BUILT_IN = {
         "mean_face": "baselines.capabilities:MEAN_FACE",
         "phone_mean": "baselines.capabilities:PHONE_MEAN",
         "ridge": "baselines.capabilities:RIDGE",
+        "head_rest": "baselines.capabilities:HEAD_REST",
+        "head_ridge": "baselines.capabilities:HEAD_RIDGE",
         "coarticulation": "coarticulation.capabilities:CAPABILITIES",
         "eyes": "eyes.capabilities:CAPABILITIES",
         "expression": "expression.capabilities:CAPABILITIES",

@@ -4,10 +4,12 @@ import io
 import pytest
 from corpora import tiny_corpus
 from living_eyes import with_eyes
+from nodding import nodding_corpus
 
 from facesynth.evaluation.papers import Material, reproduce
-from facesynth.evaluation.papers.deng2006_eyes import eyes
-from facesynth.evaluation.papers.deng2006_speech import DEGREES, coarticulation, eigenspace
+from facesynth.evaluation.papers.deng2006_eyes import EYES
+from facesynth.evaluation.papers.deng2006_head import HEAD
+from facesynth.evaluation.papers.deng2006_speech import DEGREES, SPEECH
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
 from facesynth.evaluation.papers.joined import joined, phones_until
 from facesynth.inference.errors import FacesynthError
@@ -23,6 +25,10 @@ def by_what(result, start):
     return [one for one in result.findings if one.what.startswith(start)]
 
 
+def measured(figures, material):
+    return [one for figure in figures for one in figure.findings(material)]
+
+
 def test_deng_2008_prints_the_paper_s_figure_ours_and_that_they_cannot_be_compared(corpus):
     result = reproduce("deng2008", corpus, test_limit=3)
     times = by_what(result, "synthesis of 14 / 24 / 53 / 63 phones")[0]
@@ -33,6 +39,8 @@ def test_deng_2008_prints_the_paper_s_figure_ours_and_that_they_cannot_be_compar
     assert [one.status for one in by_what(result, "phoneme Isomap maps")] == ["not implemented"]
     assert by_what(result, "variance in 25")[0].paper == "98.53 %"
     assert "Not implemented here" in result.markdown()
+    drawn = {one.where for one in result.findings if one.figure}
+    assert {"§3", "table 5", "fig. 10", "figs 15, 16"} <= drawn
 
 
 def test_saisan_2004_compares_with_the_mean_pose(corpus):
@@ -40,6 +48,7 @@ def test_saisan_2004_compares_with_the_mean_pose(corpus):
     errors = {one.what.split(", ", 1)[1]: float(one.ours) for one in by_what(result, "RMS error")}
     assert len(errors) == 5
     assert all(error > 0 for error in errors.values())
+    assert {one.where for one in result.findings if one.figure} == {"fig. 1", "fig. 3"}
     assert [one.what for one in result.findings if one.comparable] == ["largest modulus of an eigenvalue (below 1: stable)"]
 
 
@@ -78,30 +87,39 @@ def test_the_others_run(corpus, paper):
 def test_the_dissertations_speech_is_measured_and_drawn(corpus):
     sentences = sorted({r.sentence for r in corpus.records if r.emotion == "neutral"})
     material = Material(corpus, corpus, corpus.subset(r.id for r in corpus.records if r.sentence == sentences[0]), 0)
-    degree, place, speed = coarticulation(material)
+    degree, place, speed, space = measured(SPEECH, material)
     assert len(degree.ours.split(" / ")) == len(PENALTIES)
     assert degree.ours.split(" / ")[0] == str(max(DEGREES))
     assert degree.figure.startswith("data:image/")
     assert place.figure.startswith("data:image/")
     assert float(place.ours) > 0.5
     assert speed.where == "fig. 5.18"
-    space = eigenspace(material)
     assert 0 < float(space.ours.rstrip("%")) <= 100
     neutral = corpus.subset(r.id for r in corpus.records if r.emotion == "neutral")
-    assert "in neutral alone" in eigenspace(Material(neutral, neutral, neutral, 0)).why
+    assert "in neutral alone" in SPEECH[-1].findings(Material(neutral, neutral, neutral, 0))[0].why
 
 
 def test_the_dissertations_eyes_are_measured_and_drawn(tmp_path):
     corpus = with_eyes(tiny_corpus(tmp_path / "eyes", utterances=12, fps=60))
-    covered, bend, stuck, ratings = eyes(Material(corpus, corpus, corpus, 0))
+    grown, covered, bend, stuck, frames, ratings = measured(EYES, Material(corpus, corpus, corpus, 0))
     assert (covered.where, bend.where, stuck.where, ratings.where) == ("fig. 3.6", "§3.4", "§3.3", "fig. 3.8")
+    assert grown.figure.startswith("data:image/")
+    assert all(0 <= float(apart) <= 1 for apart in grown.ours.split(" / "))
+    assert frames.status == "not available"
     assert covered.figure.startswith("data:image/")
     assert 0 <= float(covered.ours.rstrip("%")) <= float(bend.ours.split()[-1].rstrip("%")) <= 100
     assert ratings.status == "not available"
     few = corpus.subset(corpus.ids[:1])
-    refused = eyes(Material(few, few, few, 0))[0]
-    assert refused.status == "not available"
-    assert "at least 10 s" in refused.why
+    refused = measured(EYES, Material(few, few, few, 0))
+    assert {one.status for one in refused} == {"not available"}
+    assert "at least 10 s" in refused[0].why
+
+
+def test_the_dissertations_heads_are_refused_where_nobody_recorded_one(tmp_path):
+    corpus = nodding_corpus(tmp_path / "headless", 3, heads=0)
+    headless = [HEAD[k].findings(Material(corpus, corpus, corpus, 0))[0] for k in (0, 1, 3, 4)]
+    assert {one.status for one in headless} == {"not available"}
+    assert all("head pose" in one.why for one in headless)
 
 
 def test_a_page_shows_every_figure_and_its_picture_and_files_hold_no_pictures():

@@ -1,10 +1,16 @@
 """Chapter 3 of the dissertation: eyes by patches of recorded ones."""
 
+from functools import lru_cache
+
 import numpy as np
 
+from facesynth.evaluation.eyes import distances
 from facesynth.evaluation.figures import as_uri, new_figure
+from facesynth.evaluation.pair import Array
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.finding import Finding, not_available
+from facesynth.evaluation.papers.drawing import RECORDED, tracks_figure
+from facesynth.evaluation.papers.figure import Figure, absent
+from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.patch_size import PatchSize, patch_size
@@ -14,17 +20,39 @@ PAPERS_PATCH_S, COVERED = 20 / 120, "55.68 %"
 GROWN_S = 60.0
 
 
-def eyes(material: Material) -> list[Finding]:
-    """All of the chapter that a corpus with eyes gives."""
-    watched = not_available("fig. 3.8", "user ratings, ANOVA", "p = 2.4e-10", "nobody was asked to watch and rate")
-    try:
-        model = Eyes().fit(material.corpus, seed=material.seed)
-        return [*_sizes(material, model), watched]
-    except FacesynthError as reason:
-        return [not_available("fig. 3.6", "eye movements covered by patches of 20 frames", COVERED, str(reason)), watched]
+SHOWN_S = 15.0
+SIGNALS = ("opening", "gaze to the left, °", "gaze up, °")
 
 
-def _sizes(material: Material, model: Eyes) -> list[Finding]:
+@lru_cache(maxsize=1)
+def learned(material: Material) -> Eyes:
+    """The model of all recordings with eyes."""
+    return Eyes().fit(material.corpus, seed=material.seed)
+
+
+def signals(material: Material) -> list[Finding]:
+    """Figs 3.4 and 3.5: opening and gaze, recorded and grown for a head that is still."""
+    model = learned(material)
+    frames, starts = model.frames.cpu().numpy().astype(np.float64), model.starts.cpu().numpy()
+    longest = max(np.split(frames, starts[1:]), key=len)
+    grown = model.runtime().grow(GROWN_S, material.seed).frames.astype(np.float64)
+    apart = distances(_named(grown), _named(frames))
+    picture = tracks_figure(
+        model.fps, {name: {RECORDED: _named(longest)[name], "grown": _named(grown)[name]} for name in SIGNALS}, longest_s=SHOWN_S
+    )
+    what = f"Kolmogorov-Smirnov distance of {GROWN_S:g} s that are grown from the recorded signals: lids, sideways, up"
+    ours = values([apart[name] for name in SIGNALS], "{:.2f}")
+    return [Finding("figs 3.4, 3.5", what, "pictures", ours, False, "the dissertation shows the signals alone", figure=picture)]
+
+
+def _named(frames: Array) -> dict[str, Array]:
+    """Signals of eyes [T, 3] by name."""
+    return dict(zip(SIGNALS, (frames * np.array([1.0, *np.degrees([1.0, 1.0])])).T, strict=True))
+
+
+def sizes(material: Material) -> list[Finding]:
+    """Fig. 3.6, and what the model makes of its patches."""
+    model = learned(material)
     frames = model.frames.cpu().numpy().astype(np.float64)
     found = patch_size(np.split(frames, model.starts.cpu().numpy()[1:]), model.fps)
     if found is None:
@@ -70,3 +98,12 @@ def _picture(found: PatchSize, fps: float) -> str:
     axes[1, 0].axvline(found.frames / fps, color="0.6", lw=0.8)
     axes[1, 0].set(xlabel="interval limit between blinks, and between large saccades, s", ylabel="covered, %")
     return as_uri(figure)
+
+
+EYES: tuple[Figure, ...] = (
+    Figure("figs 3.4, 3.5", "eye signals, recorded and grown", "pictures", signals),
+    Figure("fig. 3.6", "eye movements covered by patches of 20 frames", COVERED, sizes),
+    absent("fig. 3.7", "frames of eyes", "a picture", "no number is given; `facesynth speak` makes such frames"),
+    absent("fig. 3.8", "user ratings, ANOVA", "p = 2.4e-10", "nobody was asked to watch and rate"),
+)
+"""The chapter's figures."""

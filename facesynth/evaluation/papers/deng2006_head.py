@@ -1,26 +1,30 @@
 """Chapter 4 of the dissertation: head motion by nearest recorded movements and by hidden Markov models."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from facesynth.corpus import Utterance
-from facesynth.evaluation.figures import as_uri, new_figure
 from facesynth.evaluation.head import canonical_correlation, head_cca, head_distances
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.finding import Finding, not_available, values
-from facesynth.inference.errors import FacesynthError
+from facesynth.evaluation.papers.drawing import RECORDED, lines_figure, tracks_figure
+from facesynth.evaluation.papers.figure import Figure, absent
+from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.inference.head.hmm import HEARD_FPS
+from facesynth.inference.head.keys import HeadKeys
 from facesynth.inference.head.knn import HeadKnn
 from facesynth.inference.head.voice import prosody_of
 from facesynth.inference.motion import Motion
+from facesynth.inference.quaternions import from_rotvec, one_hemisphere, to_angles
 from facesynth.methods.head_hmm.method import HeadHmmMethod
 from facesynth.methods.head_knn.method import HeadKnnMethod, segment_of
 from facesynth.methods.head_knn.weights import Found, search_weights
 from facesynth.methods.learn.heads import angles_at, poses_of, sound_windows, with_head
+from facesynth.methods.method import Method
+from facesynth.progress import track
 
 PAPERS_WEIGHTS = (0.15782, 0.52463, 0.31755)
 """Wn, Wr, Wa with K = 7."""
@@ -41,18 +45,14 @@ TABLE: tuple[tuple[dict[str, Any], str], ...] = (
 """Configurations of table 4.1 and what the dissertation prints of them."""
 
 
-def head(material: Material) -> list[Finding]:
-    """All of the chapter that a corpus with head poses gives."""
-    try:
-        train, test = with_head(material.train), with_head(material.test)
-        return [*neighbours(material, train), prosody(material, [*train, *test]), *models(material, test)]
-    except FacesynthError as reason:
-        places = (("§4.1", "31 features in 4 dimensions", "98.89 %"), ("fig. 4.5", "error by K", "a curve"))
-        return [not_available(*place, str(reason)) for place in (*places, ("table 4.1", "head by HMM", "9.1°, 0.87"))]
+ANGLES = ("pitch, °", "yaw, °", "roll, °")
+SHOWN = 2
+"""Row of the table that is drawn: the one that the dissertation goes on with."""
 
 
-def neighbours(material: Material, train: list[Utterance]) -> list[Finding]:
+def neighbours(material: Material) -> list[Finding]:
     """§4.1, fig. 4.4 and fig. 4.5."""
+    train = with_head(material.train)
     rng = np.random.default_rng(material.seed)
     left_out = rng.permutation(len(train))[: min(SEGMENTS, max(1, len(train) // 3))]
     others = material.train.subset(u.id for i, u in enumerate(train) if i not in left_out)
@@ -64,22 +64,15 @@ def neighbours(material: Material, train: list[Utterance]) -> list[Finding]:
     best = NEIGHBOURS[int(np.argmin(errors))]
     curve = ", ".join(f"{k}: {error:.2f}" for k, error in zip(NEIGHBOURS, errors, strict=True))
     ours = f"least at {best} ({curve})"
+    picture = lines_figure({"": (NEIGHBOURS, errors)}, "neighbours K", "error (squared standard deviations)", yscale="log")
     seven = found[7].weights[[2, 0, 1]]
     return [
         Finding("§4.1", "31 features in 4 dimensions", "98.89 %", f"{model.facts['variance_share']:.2%}", False, material.unlike),
         Finding(
             "fig. 4.4", "weights Wa, Wn, Wr with K = 7", "0.318 / 0.158 / 0.525", values(seven.tolist()), False, material.unlike
         ),
-        Finding("fig. 4.5", what, "least at 7", ours, False, material.unlike, figure=error_figure(errors)),
+        Finding("fig. 4.5", what, "least at 7", ours, False, material.unlike, figure=picture),
     ]
-
-
-def error_figure(errors: Sequence[float]) -> str:
-    """Fig. 4.5."""
-    figure, axes = new_figure(6, 4, 1, 1)
-    axes[0][0].plot(NEIGHBOURS, errors, "o-", linewidth=1)
-    axes[0][0].set(xlabel="neighbours K", ylabel="error (squared standard deviations)", yscale="log")
-    return as_uri(figure)
 
 
 def _searched(model: HeadKnn, count: int, left_out: list[Utterance], seed: int) -> Found:
@@ -88,41 +81,70 @@ def _searched(model: HeadKnn, count: int, left_out: list[Utterance], seed: int) 
     return search_weights(segments, model.recorded.scales, 1, STARTS, np.random.default_rng(seed))
 
 
-def prosody(material: Material, recordings: list[Utterance]) -> Finding:
+def through_key_poses(material: Material) -> list[Finding]:
+    """Fig. 4.6: the true first and last pose of tested recordings as key poses, the dissertation's weights."""
+    near, rough, away = PAPERS_WEIGHTS
+    model = HeadKnnMethod(scaled=False, near=near, rough=rough, away=away).fit(material.train, seed=material.seed)
+    tested = with_head(material.test)
+    made = [_made(model, u, material.seed, head_keys=_ends(u)) for u in tested]
+    off = np.concatenate([_off(poses, u.motion) for u, poses in zip(tested, made, strict=True)])
+    what = f"Euler distance through the true first and last pose, mean and std over {len(tested)} recordings, °"
+    picture = _picture(tested[0], {"nearest movements": made[0]})
+    return [Finding("fig. 4.6", what, "a picture", values([off.mean(), off.std()]), False, material.unlike, figure=picture)]
+
+
+def prosody(material: Material) -> list[Finding]:
     """§4.4: canonical correlation of six prosodic features with three angles, recording by recording."""
     found = []
-    for utterance in recordings:
+    for utterance in (*with_head(material.train), *with_head(material.test)):
         angles = angles_at(utterance, HEARD_FPS)
         heard = prosody_of(sound_windows(utterance, HEARD_FPS, len(angles)), HEARD_FPS)
         found.append(canonical_correlation(heard, angles))
     what = "canonical correlation of pitch, energy and their differences with head angles"
-    return Finding("§4.4", what, "0.7", f"{np.mean(found):.2f}", False, material.unlike)
+    return [Finding("§4.4", what, "0.7", f"{np.mean(found):.2f}", False, material.unlike)]
 
 
-def models(material: Material, test: list[Utterance]) -> list[Finding]:
+def models(material: Material) -> list[Finding]:
     """Table 4.1, a row for each configuration, then what a head that rests makes of the same recordings."""
-    rows = [_row(material, test, config, paper) for config, paper in TABLE]
+    test = with_head(material.test)
+    rows = [_row(material, test, config, paper, drawn=k == SHOWN) for k, (config, paper) in enumerate(track(TABLE, "table 4.1"))]
     rest = np.concatenate([poses_of(u) for u in with_head(material.train)]).mean(axis=0)
     still = np.concatenate([_off(np.tile(rest, (len(u.motion), 1)), u.motion) for u in test])
     what = "Euler distance of a head that rests (mean, std, °)"
     return [*rows, Finding("table 4.1", what, "", values([still.mean(), still.std()]), False, "ours alone, to judge the rows by")]
 
 
-def _row(material: Material, test: list[Utterance], config: Mapping[str, Any], paper: str) -> Finding:
+def _row(material: Material, test: list[Utterance], config: Mapping[str, Any], paper: str, *, drawn: bool) -> Finding:
     model = HeadHmmMethod(**config, centred=False, noise=0.1).fit(material.train, seed=material.seed)
-    off, cca = [], []
-    for utterance in test:
-        made = model.synthesize(utterance.speech, seed=material.seed).head
-        assert made is not None  # noqa: S101 - it moves the head
-        poses = made.astype(np.float64)[np.minimum(np.arange(len(utterance.motion)), len(made) - 1)]
-        off.append(_off(poses, utterance.motion))
-        cca.append(head_cca(_with(utterance.motion, poses), _with(utterance.motion, poses_of(utterance))))
-    all_off = np.concatenate(off)
+    made = [_made(model, u, material.seed) for u in test]
+    all_off = np.concatenate([_off(poses, u.motion) for u, poses in zip(test, made, strict=True)])
+    cca = [head_cca(_with(u.motion, poses), _with(u.motion, poses_of(u))) for u, poses in zip(test, made, strict=True)]
     kind = "EG" if config.get("ergodic") else "LR"
     size = f"K={config['clusters']} S={config['states']} M={config['mixtures']} {kind}"
     what = f"HMM {size}: Euler distance (mean, std, °), CCA (mean, std)"
     ours = values([float(x) for x in (all_off.mean(), all_off.std(), np.mean(cca), np.std(cca))])
-    return Finding("table 4.1", what, paper, ours, False, material.unlike)
+    picture = _picture(test[0], {f"HMM {size}": made[0]}) if drawn else ""
+    return Finding("table 4.1", what, paper, ours, False, material.unlike, figure=picture)
+
+
+def _made(model: Method, utterance: Utterance, seed: int, **options: Any) -> Array:
+    """[T, 6] as many poses as were recorded."""
+    made = model.synthesize(utterance.speech, seed=seed, **options).head
+    assert made is not None  # noqa: S101 - it moves the head
+    return made.astype(np.float64)[np.minimum(np.arange(len(utterance.motion)), len(made) - 1)]
+
+
+def _ends(utterance: Utterance) -> HeadKeys:
+    truth = poses_of(utterance)
+    return HeadKeys(np.array([0.0, (len(truth) - 1) / utterance.motion.fps]), truth[[0, -1]])
+
+
+def _picture(utterance: Utterance, made: Mapping[str, Array]) -> str:
+    """Three angles over time."""
+    heads = {RECORDED: poses_of(utterance), **made}
+    angles = {label: np.degrees(to_angles(one_hemisphere(from_rotvec(poses[:, :3])))) for label, poses in heads.items()}
+    panels = {name: {label: track[:, k] for label, track in angles.items()} for k, name in enumerate(ANGLES)}
+    return tracks_figure(utterance.motion.fps, panels)
 
 
 def _off(made: Array, truth: Motion) -> Array:
@@ -133,3 +155,13 @@ def _off(made: Array, truth: Motion) -> Array:
 def _with(motion: Motion, poses: Array) -> Motion:
     """A motion of the head alone."""
     return replace(motion, frames=np.zeros_like(motion.frames), head=poses.astype(np.float32), eyes=None)
+
+
+HEAD: tuple[Figure, ...] = (
+    Figure("§4.1", "31 features in 4 dimensions; weights; error by the number of neighbours", "98.89 %; least at 7", neighbours),
+    Figure("fig. 4.6", "head through two key poses", "a picture", through_key_poses),
+    absent("figs 4.7, 4.12, 4.13", "frames of a head", "pictures", "no number is given; `facesynth speak` makes such frames"),
+    Figure("§4.4", "canonical correlation of prosody with head angles", "0.7", prosody),
+    Figure("table 4.1", "head by hidden Markov models", "9.1°, 0.87", models),
+)
+"""The chapter's figures."""

@@ -1,44 +1,42 @@
 """Deng 2006, §5.2: co-articulation curves, their trajectories, and the expression eigenspace."""
 
-from collections.abc import Mapping
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from facesynth.corpus import Corpus
-from facesynth.evaluation.figures import as_uri, new_figure
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2008 import trajectories
-from facesynth.evaluation.papers.finding import Finding, not_available
-from facesynth.evaluation.trajectories import trajectory_figure
+from facesynth.evaluation.papers.drawing import lines_figure, variance_figure
+from facesynth.evaluation.papers.figure import Figure
+from facesynth.evaluation.papers.finding import Finding
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import NEUTRAL
 from facesynth.methods.coarticulation.method import Coarticulation, displacement_basis
 from facesynth.methods.coarticulation.recordings import track_of, transitions_of, usable
 from facesynth.methods.coarticulation.transitions import PENALTIES, fitting_cost
-from facesynth.methods.expression.method import Expression
+from facesynth.methods.expression.differences import whole_runs
+from facesynth.methods.expression.method import differences_of, expressions_of
+from facesynth.motion.pca import Pca
 
 COMPONENTS = 5
 DEGREES = (1, 2, 3, 4, 5, 6)
 PUBLISHED = {"components": 5, "stiffness": 0, "pull": 0.0, "triphones": 1, "shrink": 1e9, "context": 0}
 """One shape for each viseme class, least squares without a prior, every triphone."""
-COLOUR = "#b3541e"
+DRAWN = 12
+"""Dimensions of the expression eigenspace whose variance is drawn."""
 
 
-def coarticulation(material: Material) -> list[Finding]:
-    """Figures 5.8 and 5.18."""
-    return [degree(material), *shown_trajectories(material)]
-
-
-def degree(material: Material) -> Finding:
+def degree(material: Material) -> list[Finding]:
     """Fig. 5.8: which degree of polynomial costs the least, for each penalty."""
     costs = fitting_costs(material.train)
     best = [min(DEGREES, key=lambda n, p=penalty: costs[p, n]) for penalty in PENALTIES]  # type: ignore[misc]
     ours = " / ".join(map(str, best))
     what = f"degree of the least fitting cost, for λ = {' / '.join(f'{p:g}' for p in PENALTIES)}"
     why = f"{material.unlike}; without a penalty the cost can only fall with the degree"
-    return Finding("fig. 5.8", what, "3", ours, False, why, figure=cost_figure(costs))
+    curves = {f"λ = {p:g}": (DEGREES, [costs[p, n] for n in DEGREES]) for p in PENALTIES}
+    picture = lines_figure(curves, "degree", "fitting cost of a frame", yscale="log")
+    return [Finding("fig. 5.8", what, "3", ours, False, why, figure=picture)]
 
 
 def fitting_costs(corpus: Corpus) -> dict[tuple[float, int], float]:
@@ -51,37 +49,29 @@ def fitting_costs(corpus: Corpus) -> dict[tuple[float, int], float]:
     return {(p, n): fitting_cost(kinds, n, p) / max(frames, 1) for p, n in product(PENALTIES, DEGREES)}
 
 
-def cost_figure(costs: Mapping[tuple[float, int], float]) -> str:
-    """A curve for each penalty over the degree."""
-    figure, axes = new_figure(6, 4, 1, 1)
-    for penalty in PENALTIES:
-        axes[0][0].plot(DEGREES, [costs[penalty, n] for n in DEGREES], "o-", label=f"λ = {penalty:g}", linewidth=1)
-    axes[0][0].set(xlabel="degree", ylabel="fitting cost of a frame", yscale="log")
-    axes[0][0].legend(fontsize=8, frameon=False)
-    return as_uri(figure)
-
-
 def shown_trajectories(material: Material) -> list[Finding]:
     """Fig. 5.18: neutral sentences that were not learned from."""
     neutral = usable(material.test, NEUTRAL)
     if not neutral:
-        return [
-            not_available("fig. 5.18", "trajectories of the co-articulation model", "pictures", "no neutral sentence is tested")
-        ]
+        raise FacesynthError("no neutral sentence is tested")
     model = Coarticulation.from_config(PUBLISHED).fit(material.train)
-    spoken = [(u, model.synthesize(u.speech)) for u in neutral]
-    utterance, motion = spoken[0]
-    name = "co-articulation"
-    picture = trajectory_figure(utterance, {name: motion}, {name: COLOUR})
-    first, *others = trajectories(spoken, "fig. 5.18")
-    return [replace(first, figure=picture), *others]
+    return trajectories([(u, model.synthesize(u.speech)) for u in neutral], "fig. 5.18", "co-articulation")
 
 
-def eigenspace(material: Material) -> Finding:
+def eigenspace(material: Material) -> list[Finding]:
     """§5.2.2: how much of expressive motion three dimensions hold."""
+    differences, unlike = differences_of(material.train)
+    emotions, _ = expressions_of(differences, material.train, unlike)
+    frames = np.concatenate([run for d in differences if d.emotion in emotions for run in whole_runs(d.frames)])
+    shares = Pca.fit(frames, DRAWN).variance_ratio.numpy()
+    ours = f"{shares[:3].sum():.1%}"
     what = "variance of the expression eigenspace in 3 dimensions"
-    try:
-        model = Expression(components=3).fit(material.train)
-    except FacesynthError as reason:
-        return not_available("§5.2.2", what, "86.5 %", str(reason))
-    return Finding("§5.2.2", what, "86.5 %", f"{model.facts['variance']:.1%}", False, material.unlike)
+    return [Finding("§5.2.2", what, "86.5 %", ours, False, material.unlike, figure=variance_figure(shares, 3))]
+
+
+SPEECH: tuple[Figure, ...] = (
+    Figure("fig. 5.8", "degree of polynomial of the least fitting cost", "3", degree),
+    Figure("fig. 5.18", "trajectories of the co-articulation model", "pictures", shown_trajectories),
+    Figure("§5.2.2", "variance of the expression eigenspace in 3 dimensions", "86.5 %", eigenspace),
+)
+"""The chapter's figures."""

@@ -1,18 +1,27 @@
 """Deng and Neumann 2008."""
 
+from dataclasses import replace
+from functools import lru_cache
+
 import numpy as np
 
 from facesynth.corpus import Utterance
 from facesynth.evaluation.cost import stopwatch
-from facesynth.evaluation.geometry import deng_error
+from facesynth.evaluation.figures import COLOURS
+from facesynth.evaluation.geometry import deng_error, deng_errors
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.papers import Material
+from facesynth.evaluation.papers.drawing import lines_figure, variance_figure
+from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented, values
 from facesynth.evaluation.papers.joined import joined
-from facesynth.evaluation.trajectories import shown_channels
+from facesynth.evaluation.trajectories import shown_channels, trajectory_figure
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.efase.method import Efase
+
+Spoken = list[tuple[Utterance, Motion]]
+"""Tested utterances, each with what was made for it."""
 
 PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 PHONES = (14, 24, 53, 63)
@@ -20,37 +29,40 @@ SECONDS = (221.391, 333.171, 815.719, 942.609)
 SECONDS_GPU = (50.828, 90.891, 232.078, 256.484)
 
 
-def findings(material: Material) -> list[Finding]:
-    """Tables and figures of the paper."""
-    model = Efase.from_config(PUBLISHED).fit(material.train, seed=material.seed)
-    spoken = [(u, model.synthesize(u.speech, seed=material.seed)) for u in material.test]
-    return [
-        *database(model, material, "§3"),
-        times(model, material, "table 5", PHONES, SECONDS, "Athlon 64 X2, 2008"),
-        *errors(spoken, material),
-        *trajectories(spoken, "figs 15, 16"),
-        not_available("table 5", "the same on a graphics card, s", values(SECONDS_GPU), "measured on the processor alone"),
-        not_implemented("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps"),
-        not_available("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.deform.mesh_distance`"),
-    ]
+NAME = "eFASE"
+MAPS = not_implemented("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps")
+EMOTIONS = ("neutral", "angry", "sad")
+"""Of figure 10."""
 
 
-def database(model: Efase, material: Material, where: str) -> list[Finding]:
+@lru_cache(maxsize=1)
+def published(material: Material) -> Efase:
+    """The paper's model, which several figures share."""
+    return Efase.from_config(PUBLISHED).fit(material.train, seed=material.seed)
+
+
+@lru_cache(maxsize=1)
+def spoken(material: Material) -> Spoken:
+    """What that model says."""
+    return [(u, published(material).synthesize(u.speech, seed=material.seed)) for u in material.test]
+
+
+def database(material: Material, where: str) -> list[Finding]:
     """PCA and the count of nodes."""
+    model = published(material)
+    shares = model.pca.variance_ratio.cpu().numpy()
     share = float(model.pca.variance_ratio.sum())
     dimension = material.corpus.layout.channels
+    what = f"variance in 25 of {dimension} dimensions (paper: of 270)"
     return [
-        Finding(
-            where, f"variance in 25 of {dimension} dimensions (paper: of 270)", "98.53 %", f"{share:.2%}", False, material.unlike
-        ),
+        Finding(where, what, "98.53 %", f"{share:.2%}", False, material.unlike, figure=variance_figure(shares, len(shares))),
         Finding(where, "motion nodes", "5556", str(len(model.facts["names"])), False, "another amount of recordings"),
     ]
 
 
-def times(
-    model: Efase, material: Material, where: str, phones: tuple[int, ...], seconds: tuple[float, ...], hardware: str
-) -> Finding:
+def times(material: Material, where: str, phones: tuple[int, ...], seconds: tuple[float, ...], hardware: str) -> list[Finding]:
     """Time of synthesis of as many phones as the paper's phrases have: tested utterances one after the other, cut there."""
+    model = published(material)
     said = [utterance.speech for utterance in material.test]
     speeches = [joined(said, count) for count in phones]
     model.synthesize(speeches[0])
@@ -58,47 +70,59 @@ def times(
     what = f"synthesis of {values(phones, '{:.0f}')} phones, s"
     nodes = len(model.facts["names"])
     why = f"other hardware (paper: {hardware}), {nodes} nodes in place of 5556, another search of the same optimum"
-    return Finding(where, what, values(seconds), values(took), False, why)
+    lines = {f"paper ({hardware})": (phones, seconds), "ours": (phones, took)}
+    picture = lines_figure(lines, "phones", "s", yscale="log")
+    return [Finding(where, what, values(seconds), values(took), False, why, figure=picture)]
 
 
-def errors(spoken: list[tuple[Utterance, Motion]], material: Material) -> list[Finding]:
-    """Eq. 13 of sentences in the emotions of figure 10."""
-    unit = material.corpus.layout.unit
-    found = []
-    for emotion in ("neutral", "angry", "sad"):
-        errors = [deng_error(motion, u.motion) for u, motion in spoken if u.emotion == emotion]
+def errors(material: Material) -> list[Finding]:
+    """Eq. 13 of sentences in the emotions of figure 10; the picture shows the first of each."""
+    made, unit = spoken(material), material.corpus.layout.unit
+    found, lines = [], {}
+    for emotion in EMOTIONS:
+        pairs = [(motion, u.motion) for u, motion in made if u.emotion == emotion]
         what = f"error per frame (eq. 13), {emotion}, {unit}²"
-        if errors:
-            ours = f"{np.mean(errors):.3g} (mean of {len(errors)} sentences)"
-            found.append(
-                Finding("fig. 10", what, "a curve for one sentence", ours, False, "the curve's scale cannot be read as a number")
-            )
-        else:
+        if not pairs:
             found.append(not_available("fig. 10", what, "a curve", f"the tested recordings have no {emotion} sentence"))
+            continue
+        ours = f"{np.mean([deng_error(*pair) for pair in pairs]):.3g} (mean of {len(pairs)} sentences)"
+        found.append(
+            Finding("fig. 10", what, "a curve for one sentence", ours, False, "the curve's scale cannot be read as a number")
+        )
+        lines[emotion] = (np.arange(len(pairs[0][0])), deng_errors(*pairs[0]))
+    if lines:
+        picture = lines_figure(lines, "frame", f"error, {unit}²", style="-")
+        first = next(i for i, one in enumerate(found) if one.status == "measured")
+        found[first] = replace(found[first], figure=picture)
     return found
 
 
-def trajectories(spoken: list[tuple[Utterance, Motion]], where: str) -> list[Finding]:
-    """How far a lip point's trajectory and velocity follow the recorded ones, as correlations."""
+def trajectories(made: Spoken, where: str, name: str = NAME) -> list[Finding]:
+    """How far a lip point's trajectory and velocity follow the recorded ones, as correlations; the first utterance is drawn."""
+    utterance, motion = made[0]
     try:
-        name, channel = shown_channels(spoken[0][1].layout, spoken[0][0].motion.frames.astype(np.float64))[0]
+        channels = drawn_channels(utterance.motion)
     except UnavailableError as reason:
         return [not_available(where, "lip trajectory", "a picture", str(reason))]
-    pairs = [(u.motion.frames[:, channel], motion.frames[:, channel]) for u, motion in spoken]
-    place = np.mean([_correlation(truth, made) for truth, made in pairs])
-    speed = np.mean([_correlation(np.diff(truth), np.diff(made)) for truth, made in pairs])
     why = "the paper shows one sentence, as a picture, and says that velocities deviate more"
-    return [
-        Finding(where, f"correlation of the trajectory of {name}", "quite close", f"{place:.2f}", False, why),
-        Finding(
-            where,
-            f"correlation of its velocity: {'lower' if speed < place else 'not lower'}",
-            "deviates more",
-            f"{speed:.2f}",
-            False,
-            why,
-        ),
-    ]
+    found = []
+    for label, channel in channels:
+        pairs = [(u.motion.frames[:, channel], motion.frames[:, channel]) for u, motion in made]
+        place = np.mean([_correlation(truth, made) for truth, made in pairs])
+        speed = np.mean([_correlation(np.diff(truth), np.diff(made)) for truth, made in pairs])
+        slower = f"correlation of its velocity: {'lower' if speed < place else 'not lower'}"
+        found.append(Finding(where, f"correlation of the trajectory of {label}", "quite close", f"{place:.2f}", False, why))
+        found.append(Finding(where, slower, "deviates more", f"{speed:.2f}", False, why))
+    picture = trajectory_figure(utterance, {name: motion}, {name: COLOURS[1]}, channels)
+    return [replace(found[0], figure=picture), *found[1:]]
+
+
+def drawn_channels(motion: Motion) -> list[tuple[str, int]]:
+    """(name, channel) of the lower lip, and of a cheek where a layout names one, as in the papers."""
+    layout = motion.layout
+    cheeks = [k for k, name in enumerate(layout.names) if name.startswith("cheek_r")]
+    lip = shown_channels(layout, motion.frames.astype(np.float64))[:1]
+    return lip + [(f"{layout.names[k]}, height", k * layout.dimension + 1) for k in cheeks[:1]]
 
 
 def _seconds(model: Efase, speech: Speech) -> float:
@@ -112,3 +136,22 @@ def _correlation(truth: np.ndarray, made: np.ndarray) -> float:
     if seen.sum() < 3 or truth[seen].std() == 0 or made[seen].std() == 0:
         return 0.0
     return float(np.corrcoef(truth[seen], made[seen])[0, 1])
+
+
+FIGURES: tuple[Figure, ...] = (
+    Figure("§3", "variance in 25 dimensions; motion nodes", "98.53 %; 5556", lambda material: database(material, "§3")),
+    Figure("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", lambda _: [MAPS]),
+    Figure("fig. 10", "error per frame (eq. 13)", "curves for three sentences", errors),
+    absent("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.deform.mesh_distance`"),
+    Figure(
+        "figs 15, 16", "trajectory of a lip marker", "a picture", lambda material: trajectories(spoken(material), "figs 15, 16")
+    ),
+    Figure(
+        "table 5",
+        "seconds of synthesis",
+        values(SECONDS),
+        lambda material: times(material, "table 5", PHONES, SECONDS, "Athlon 64 X2, 2008"),
+    ),
+    absent("table 5", "the same on a graphics card, s", values(SECONDS_GPU), "measured on the processor alone"),
+)
+"""What the page shows, in the paper's order."""

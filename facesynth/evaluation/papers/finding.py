@@ -11,7 +11,10 @@ Status = Literal["measured", "not available", "not implemented"]
 COLUMNS = ("where", "what", "paper", "ours", "comparable", "why", "status")
 
 
-STYLE = "body{max-width:60em;margin:2em auto;font:15px/1.5 sans-serif}h2{font-size:1.05em;margin-top:2em}img{max-width:100%}"
+STYLE = (
+    "body{max-width:66em;margin:2em auto;font:15px/1.5 sans-serif}h2{font-size:1.1em;margin-top:2.5em}img{max-width:100%}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em .2em 0;text-align:left;vertical-align:top;border-top:1px solid #ddd}"
+)
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,9 @@ class Reproduction:
         return {**vars(self), "findings": [plain(one) for one in self.findings]}
 
     def page(self) -> str:
-        """One page (HTML) that needs no other file: every figure of the paper with ours, and its picture where one is drawn."""
-        shown = "\n".join(_section(one) for one in self.findings)
+        """One page (HTML) that needs no other file: each figure of the paper with what was measured, and its pictures."""
+        places = dict.fromkeys(one.where for one in self.findings)
+        shown = "\n".join(_section(where, [one for one in self.findings if one.where == where]) for where in places)
         head = f"<h1>{escape(self.paper)}</h1><p>{escape(self.reference)}</p><p>{escape(self.setting)}</p>"
         title = f'<meta charset="utf-8"><title>{escape(self.paper)}</title><style>{STYLE}</style>'
         return f'<!doctype html><html lang="en">{title}{head}\n{shown}</html>\n'
@@ -87,13 +91,20 @@ def plain(one: Finding) -> dict[str, Any]:
     return {key: value for key, value in asdict(one).items() if key != "figure"}
 
 
-def _section(one: Finding) -> str:
-    title = f"<h2>{escape(one.where)}: {escape(one.what)}</h2>"
+def _section(where: str, findings: Sequence[Finding]) -> str:
+    """A figure of the paper: what was measured of it, then its pictures."""
+    head = "<tr><th></th><th>paper</th><th>ours</th><th>comparable</th></tr>"
+    rows = "\n".join(map(_table_row, findings))
+    pictures = "\n".join(f'<p><img src="{one.figure}" alt="{escape(one.what)}"></p>' for one in findings if one.figure)
+    return f"<h2>{escape(where)}</h2><table>{head}\n{rows}</table>\n{pictures}"
+
+
+def _table_row(one: Finding) -> str:
+    cells = [escape(one.what), escape(one.paper)]
     if one.status != "measured":
-        return f"{title}<p>paper: {escape(one.paper)}; {one.status} here: {escape(one.why)}</p>"
-    verdict = f"{'comparable' if one.comparable else 'not comparable'}: {escape(one.why)}"
-    picture = f'<img src="{one.figure}" alt="{escape(one.what)}">' if one.figure else ""
-    return f"{title}<p>paper: {escape(one.paper)}; ours: <b>{escape(one.ours)}</b></p><p>{verdict}</p>{picture}"
+        return f"<tr><td>{'</td><td>'.join(cells)}</td><td colspan=2>{one.status} here: {escape(one.why)}</td></tr>"
+    cells += [f"<b>{escape(one.ours)}</b>", f"{'yes' if one.comparable else 'no'}: {escape(one.why)}"]
+    return f"<tr><td>{'</td><td>'.join(cells)}</td></tr>"
 
 
 def not_implemented(where: str, what: str, paper: str, why: str) -> Finding:

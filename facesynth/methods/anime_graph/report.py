@@ -102,6 +102,19 @@ class MapTrial:
             curve[count] = float(np.mean(errors))
         return curve
 
+    def left_out(self, source: str, target: str, name: str, *, seed: int = 0) -> tuple[Floats, Floats, Floats]:
+        """[T, C] the first sentence in the source emotion, recorded in the target, and mapped by what the others teach.
+
+        name: kernel and width, as in `MapScore.mapped`.
+        """
+        pairs, samples = self._pairs(source, target)
+        a, b = pairs[0]
+        known = [s for s in samples if s.sentence != a.sentence]
+        kernel, width = next((k, w) for k in KERNELS for w in WIDTHS if f"{k} {w}" == name)
+        rbf = MapLearner(known, self.centres, seed=seed).fit(width, kernel)
+        truth = b.frames[aligned(a, b, self.split.speech)]
+        return a.frames.astype(np.float64), truth.astype(np.float64), self.mapped(a, rbf, *self._shifts(known))
+
     def with_sentences(self, most: int) -> "MapTrial":
         """The same with at most so many sentences, those that were recorded in the most emotions."""
         emotions: dict[str, set[str]] = {}

@@ -13,3 +13,15 @@ RIDGE = Capabilities(
 TCN = Capabilities(
     "tcn", "a small temporal convolution network", home=f"{HOME}.tcn", hears_phones=False, minutes=3.0, reference="tcn"
 )
+HEAD_REST = Capabilities(
+    "head_rest", "the head rests", home=f"{HOME}.heads", part="head", hears_phones=False, reference="head at rest"
+)
+HEAD_RIDGE = Capabilities(
+    "head_ridge",
+    "a linear map from prosody to the head",
+    home=f"{HOME}.heads",
+    part="head",
+    hears_phones=False,
+    minutes=1.0,
+    reference="head by ridge",
+)

@@ -35,6 +35,11 @@ def plot_orders(model: LDS, path: Path) -> None:
 
 
 def plot_innovations(model: LDS, path: Path) -> None:
+    """`innovations_figure` as a file."""
+    _save(innovations_figure(model), path)
+
+
+def innovations_figure(model: LDS) -> Any:
     """Histograms of the independent sources of the noise beside a Gaussian of their variance, with their kurtosis."""
     edges, cumulative = model.innovations.edges.double().numpy(), model.innovations.cumulative.double().numpy()
     shown = min(len(edges), SOURCES_SHOWN)
@@ -46,7 +51,7 @@ def plot_innovations(model: LDS, path: Path) -> None:
         v = np.linspace(edge[0], edge[-1], 200)
         axes.plot(v, _gaussian(v, edge, share), color="black", linewidth=0.8)
         axes.set(title=f"excess kurtosis {kurtosis:.1f}", yticks=[])
-    _save(figure, path)
+    return figure
 
 
 def _gaussian(v: NDArray[Any], edge: NDArray[Any], share: NDArray[Any]) -> NDArray[Any]:

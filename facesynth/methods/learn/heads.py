@@ -11,6 +11,7 @@ from facesynth.inference.head.voice import pitch_windows
 from facesynth.inference.pitch import RATE
 from facesynth.inference.quaternions import from_rotvec, one_hemisphere, to_angles
 from facesynth.inference.sound import resample
+from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import mean_pose
 
 Floats = NDArray[np.float64]
@@ -60,7 +61,12 @@ def about_mean(poses: Iterable[Floats]) -> list[Floats]:
 
 def sound_windows(utterance: Utterance, fps: float, count: int) -> Floats:
     """[T, L] sound around each of `count` frames at `fps`."""
-    audio = resample(utterance.speech.audio, utterance.speech.sample_rate, RATE)
+    return prosody_windows(utterance.speech, fps, count)
+
+
+def prosody_windows(speech: Speech, fps: float, count: int) -> Floats:
+    """[T, L] the same of speech without a recording."""
+    audio = resample(speech.audio, speech.sample_rate, RATE)
     return pitch_windows(fps).cut(audio, 0, 0, count).astype(np.float64)
 
 
