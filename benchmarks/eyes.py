@@ -29,7 +29,7 @@ from facesynth.inference.eyes import at_rest
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.methods.eyes.method import Eyes
-from facesynth.methods.eyes.recordings import opening_of, shut_level
+from facesynth.motion.lids import opening_of, shut_level
 
 LAYOUT = Layout("curves", ("jawOpen",))
 PX_PER_DEG = 40.0

@@ -17,7 +17,8 @@ from facesynth.corpus.eyes import recorded_eyes
 from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixation_statistics, pooled
 from facesynth.inference.eyes import Floats
 from facesynth.methods.eyes.method import Eyes
-from facesynth.methods.eyes.recordings import eyes_of, opening_of, whole_pieces
+from facesynth.methods.eyes.recordings import whole_pieces
+from facesynth.motion.lids import eyes_of, opening_of
 
 LEAST_S = 1.0
 """Of a recording that is compared with."""

@@ -14,7 +14,7 @@ from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixa
 from facesynth.evaluation.head_statistics import HeadSample, take_apart
 from facesynth.evaluation.table import Column
 from facesynth.inference.motion import Motion
-from facesynth.methods.eyes.recordings import opening_of, shut_level
+from facesynth.motion.lids import opening_of, shut_level
 
 HEAD = {
     "speed in speech": "head_speed",

@@ -11,8 +11,9 @@ from facesynth.inference.gaze import REACH_RAD
 from facesynth.inference.motion import Motion
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.patch_size import knee, patch_size
-from facesynth.methods.eyes.recordings import compensation_in, sharpened, shut_level
+from facesynth.methods.eyes.recordings import compensation_in, sharpened
 from facesynth.methods.registry import load
+from facesynth.motion.lids import shut_level
 
 
 @pytest.fixture(scope="module")

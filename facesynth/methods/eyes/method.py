@@ -18,9 +18,10 @@ from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Account
 from facesynth.methods.eyes.capabilities import CAPABILITIES
 from facesynth.methods.eyes.patch_size import patch_size
-from facesynth.methods.eyes.recordings import at_rate, compensation_in, opening_of, shut_level, texture_of, whole_pieces
+from facesynth.methods.eyes.recordings import at_rate, compensation_in, texture_of, whole_pieces
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
+from facesynth.motion.lids import opening_of, shut_level
 
 AUTO = "auto"
 """In place of a number that is found in the recordings."""

@@ -6,18 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.errors import FacesynthError
 from facesynth.inference.eyes import Floats
 from facesynth.inference.gaze import quick, quick_turns
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import runs
+from facesynth.motion.lids import eyes_of, opening_of
 
 AWAKE = 0.8
 """Lids that are open so far show the eye as it is; under them trackers guess."""
-DIP, DIP_S = 0.3, 0.5
-"""A blink takes the lids down by at least this share of the opening, and up again within this time, seconds."""
-DEEPEST = 0.1
-"""Share of the blinks that shut the eyes as far as they go."""
 MOVING_RAD = 1e-3
 """Deviation of a head or a gaze that moves."""
 
@@ -47,16 +43,6 @@ def compensation_in(pieces: Sequence[Motion]) -> float:
     return float(np.clip(-crossed / own, 0, 1)) if own > count * MOVING_RAD**2 else 0.0
 
 
-def shut_level(pieces: Sequence[Motion]) -> float:
-    """Opening at which the lids are shut: what the deepest tenth of the blinks reaches; 0 where there are none.
-
-    Whoever follows lids through video sees them shut at a height of their own, rarely in the very frame, and many blinks
-    are not whole.
-    """
-    lowest = [low for piece in pieces for low in _dips(eyes_of(piece)[:, 0], piece.fps)]
-    return float(np.clip(np.quantile(lowest, DEEPEST), 0, 1 - DIP)) if lowest else 0.0
-
-
 def texture_of(piece: Motion, shut: float, compensation: float, smoothed_s: float) -> Floats:
     """[T, 3] a piece as it is grown from: opening that reaches 0 in a blink; gaze about its middle, without smoothing.
 
@@ -73,11 +59,6 @@ def held_gaze(piece: Motion, compensation: float) -> Floats:
     return gaze if piece.head is None else gaze + compensation * quick_turns(piece.head, piece.fps)
 
 
-def opening_of(piece: Motion, shut: float) -> Floats:
-    """[T, 1] opening of the lids that reaches 0 where they are shut."""
-    return np.clip((eyes_of(piece)[:, :1].astype(np.float64) - shut) / (1 - shut), 0, 1)
-
-
 # Kuwahara's filter in one dimension: of the `width` frames up to a frame and of those from it on, the mean of the half that
 # varies less. A jump that an average of `width` frames made a ramp becomes a jump again; rests stay as they are.
 def sharpened(gaze: Floats, width: int) -> Floats:
@@ -89,13 +70,6 @@ def sharpened(gaze: Floats, width: int) -> Floats:
     means, spread = windows.mean(axis=2), windows.var(axis=2).sum(axis=1)
     before, after = np.arange(len(gaze)), np.arange(len(gaze)) + width - 1
     return means[np.where(spread[before] <= spread[after], before, after)]
-
-
-def eyes_of(motion: Motion) -> NDArray[np.float32]:
-    """[T, 3] eyes that a motion must have."""
-    if motion.eyes is None:
-        raise FacesynthError("a recording without eyes teaches none; take those out that have no gaze and no lids")
-    return motion.eyes
 
 
 def at_rate(motion: Motion, fps: float) -> Motion:
@@ -115,13 +89,3 @@ def at_rate(motion: Motion, fps: float) -> Motion:
 def _piece(motion: Motion, start: int, stop: int) -> Motion:
     head = None if motion.head is None else motion.head[start:stop]
     return Motion(motion.frames[start:stop], motion.fps, motion.layout, head, eyes_of(motion)[start:stop])
-
-
-def _dips(opening: NDArray[np.floating], fps: float) -> list[float]:
-    """Lowest value of each short dip of the opening [T]."""
-    usual = float(np.median(opening))
-    return [
-        float(opening[run.start : run.stop].min())
-        for run in runs(opening < usual - DIP)
-        if len(run) <= DIP_S * fps and run.start > 0 and run.stop < len(opening)
-    ]
