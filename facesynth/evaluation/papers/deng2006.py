@@ -51,7 +51,7 @@ FIGURES: tuple[Figure, ...] = (
         "figs 5.30, 5.31",
         "trajectories of a cheek and a lip marker",
         "pictures",
-        lambda material: trajectories(spoken(material), "figs 5.30, 5.31"),
+        lambda material: trajectories(spoken(material), "figs 5.30, 5.31", cheek=True),
     ),
 )
 """What the page shows, in the dissertation's order."""

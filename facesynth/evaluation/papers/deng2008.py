@@ -97,11 +97,14 @@ def errors(material: Material) -> list[Finding]:
     return found
 
 
-def trajectories(made: Spoken, where: str, name: str = NAME) -> list[Finding]:
-    """How far a lip point's trajectory and velocity follow the recorded ones, as correlations; the first utterance is drawn."""
+def trajectories(made: Spoken, where: str, name: str = NAME, *, cheek: bool = False) -> list[Finding]:
+    """How far a lip point's trajectory and velocity follow the recorded ones, as correlations; the first utterance is drawn.
+
+    cheek: those of a cheek too, where the layout names one.
+    """
     utterance, motion = made[0]
     try:
-        channels = drawn_channels(utterance.motion)
+        channels = drawn_channels(utterance.motion, cheek=cheek)
     except UnavailableError as reason:
         return [not_available(where, "lip trajectory", "a picture", str(reason))]
     why = "the paper shows one sentence, as a picture, and says that velocities deviate more"
@@ -117,10 +120,10 @@ def trajectories(made: Spoken, where: str, name: str = NAME) -> list[Finding]:
     return [replace(found[0], figure=picture), *found[1:]]
 
 
-def drawn_channels(motion: Motion) -> list[tuple[str, int]]:
-    """(name, channel) of the lower lip, and of a cheek where a layout names one, as in the papers."""
+def drawn_channels(motion: Motion, *, cheek: bool) -> list[tuple[str, int]]:
+    """(name, channel) of the lower lip, and of a cheek, as in the papers."""
     layout = motion.layout
-    cheeks = [k for k, name in enumerate(layout.names) if name.startswith("cheek_r")]
+    cheeks = [k for k, name in enumerate(layout.names) if cheek and name.startswith("cheek_r")]
     lip = shown_channels(layout, motion.frames.astype(np.float64))[:1]
     return lip + [(f"{layout.names[k]}, height", k * layout.dimension + 1) for k in cheeks[:1]]
 
