@@ -13,6 +13,7 @@ from facesynth.inference.errors import FacesynthError
 if TYPE_CHECKING:
     from facesynth.inference.motion import Motion
     from facesynth.inference.speech import Speech
+    from facesynth.motion.maps.phone_map import Kind, PhoneMap
 
 Part = Literal["mouth", "expression", "head", "eyes"]
 """Of the face: what a method moves."""
@@ -163,6 +164,19 @@ class Editing(Protocol):
         ...
 
 
+@runtime_checkable
+class Browsing(Protocol):
+    """Chooses among recorded nodes, which can be looked at on maps."""
+
+    def mapped_phones(self) -> tuple[str, ...]:
+        """Phones that have nodes."""
+        ...
+
+    def phone_map(self, phone: str, kind: Kind = "isomap") -> PhoneMap:
+        """The frames of one phone's nodes on a plane."""
+        ...
+
+
 WORDS: Mapping[type, tuple[str, str]] = {
     Explaining: ("tells nothing of its choices", "explain them"),
     Accounting: ("gives no account of its search", "give one"),
@@ -172,6 +186,7 @@ WORDS: Mapping[type, tuple[str, str]] = {
     Looking: ("knows nothing of the head", "do"),
     Expressing: ("adds no expression to other motion", "add one"),
     Streaming: ("makes no motion while the phones arrive", "do"),
+    Browsing: ("has no nodes to look at", "have some"),
     Editing: ("makes everything anew after each change", "keep what they found"),
 }
 """What a method without an ability does not do, and what those with it do."""

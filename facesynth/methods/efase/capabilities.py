@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from facesynth.methods.capabilities import Accounting, Capabilities, Editing, Explaining, Joining, Option, Reporting
+from facesynth.methods.capabilities import Accounting, Browsing, Capabilities, Editing, Explaining, Joining, Option, Reporting
 
 CAPABILITIES = Capabilities(
     "efase",
@@ -16,7 +16,7 @@ CAPABILITIES = Capabilities(
             reader="facesynth.methods.efase.constraints:read_constraints",
         ),
     ),
-    abilities=frozenset({Explaining, Accounting, Reporting, Joining, Editing}),
+    abilities=frozenset({Explaining, Accounting, Reporting, Joining, Editing, Browsing}),
     minutes=5.0,
     of_each_phone=5,
     exporter="facesynth.export.efase:efase_content",

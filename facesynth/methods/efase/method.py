@@ -23,15 +23,18 @@ from facesynth.inference.efase.search import Engine
 from facesynth.inference.efase.stream import EfaseStream
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
+from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.audio import AudioTerms
 from facesynth.methods.efase.capabilities import CAPABILITIES
 from facesynth.methods.efase.database import build_database
+from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, mapped_phones, places_of_all
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.torch_search import torch_engine
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
+from facesynth.motion.maps.phone_map import Kind, PhoneMap
 from facesynth.motion.pca import Pca
 
 METRICS = ("sound_metric", "pose_metric")
@@ -54,7 +57,8 @@ class Efase(Method):
     speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`); 0 in the paper.
 
     With `learn`, training starts from these weights and learns all that are above 0 on sentences of the corpus that it
-    keeps out of the database meanwhile (see `learning`) before it fits with what it found.
+    keeps out of the database meanwhile (see `learning`) before it fits with what it found. With `maps`, the Isomap of each
+    phone's frames is kept in the model (8 bytes a frame); without, it is made when it is asked for.
     """
 
     pca: Pca
@@ -91,6 +95,7 @@ class Efase(Method):
         pose_weight: float = 0.0,
         sharpening: float = 0.0,
         learn: bool = False,
+        maps: bool = True,
     ) -> None:
         super().__init__()
         lowest = min(temperature, audio_weight, pose_weight, sharpening)
@@ -140,6 +145,7 @@ class Efase(Method):
         self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
         self.audio.learn(corpus, self.pca, database.names, nodes.phones, seed)
         self._keep_bounds()
+        self._keep_maps(keep=self.config["maps"])
         return self.to(device)
 
     @classmethod
@@ -263,6 +269,19 @@ class Efase(Method):
         """The shares of `report`."""
         return Account(self.report(speech, constraints=constraints))
 
+    def mapped_phones(self) -> tuple[str, ...]:
+        """Phones that have nodes, and so a map."""
+        return mapped_phones(self.nodes())
+
+    def phone_map(self, phone: str, kind: Kind = "isomap") -> PhoneMap:
+        """The frames of one phone's nodes on a plane, as it was kept in training or made now."""
+        nodes, kept = self.nodes(), getattr(self, "map_points", None)
+        cluster = cluster_of(*self._database(), phone)
+        if kind != "isomap" or kept is None or len(kept) != len(nodes.frames):
+            return PhoneMap.of(cluster, kind)
+        which = np.flatnonzero(nodes.phones == PHONES.index(phone))
+        return PhoneMap.of(cluster, kind, kept.cpu().numpy()[frames_of(nodes, which)])
+
     def joins(self, speech: Speech) -> Ints:
         """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
         return self.speaker.joins(speech)
@@ -273,8 +292,9 @@ class Efase(Method):
         other.audio.share(self.audio)
         other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
         other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
-        for name in ("node_frames", "node_table", "rest"):
-            other.register_buffer(name, getattr(self, name))
+        for name in ("node_frames", "node_table", "rest", "map_points"):
+            if hasattr(self, name):
+                other.register_buffer(name, getattr(self, name))
         other.facts["median_transition"] = median_transition(other.nodes(), replace(other.weights(), pnt=1.0))
         other._keep_bounds()
         return other
@@ -283,6 +303,13 @@ class Efase(Method):
         self._speaker = None
         for name, table in step_bounds(self.nodes(), self.weights()).items():
             self.register_buffer(name, torch.from_numpy(table).to(self.node_frames.device))
+
+    def _keep_maps(self, *, keep: bool) -> None:
+        self.register_buffer("map_points", torch.from_numpy(places_of_all(*self._database())) if keep else torch.zeros(0, 2))
+
+    def _database(self) -> tuple[Nodes, list[str], tuple[str, ...], float, Decode]:
+        """Nodes, their names, the emotions, the rate of the frames (Hz), and what decodes them."""
+        return self.nodes(), self.facts["names"], self.emotions, self.config["database_fps"], self._decode
 
     def _engine(self) -> Engine | None:
         """On another device than the processor, the search by tensors there."""
