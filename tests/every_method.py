@@ -9,6 +9,7 @@ SETTINGS = {
     "lds": {"deterministic_order": 2, "stochastic_order": 2, "lead_ms": 0.0},
     "head_knn": {"starts": 2, "validation": 2},
     "tcn": {"steps": 3},
+    "network": {"steps": 3},
 }
 """Of those whose defaults leave something off, need longer recordings or learn long."""
 METHODS = {name: SETTINGS.get(name, {}) for name in list_methods()}

@@ -26,6 +26,8 @@ from facesynth.face.texture.warp import PiecewiseAffineWarp
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods import registry
 from facesynth.methods.emotion.svm import Svm, SvmSettings
+from facesynth.methods.learn.point_loss import PointLoss
+from facesynth.methods.learn.windows import Batch
 from facesynth.motion.ica import Ica
 from facesynth.motion.pca import Pca
 from facesynth.motion.rbf import RbfMap
@@ -51,6 +53,13 @@ def rbf_map():
 
 def svm(kernel):
     return Svm.fit(FRAMES.double().numpy(), np.arange(40) % 3, SvmSettings(kernel))
+
+
+def point_loss():
+    layout = tiny_layout()
+    loss = PointLoss(layout, torch.eye(layout.channels), 1.0)
+    made = torch.from_numpy(RNG.normal(size=(2, 5, layout.channels))).float()
+    return loss, (made, 0 * made, Batch(made, 0.5 * made, torch.ones(2, 5)))
 
 
 def warp():
@@ -86,6 +95,7 @@ PARTS = {
     "phone network": lambda rig: (phone_network(), (SOUND[None],)),
     "RASTA-PLP": lambda rig: (RastaPlp(), (SOUND,)),
     "warp": lambda rig: warp(),
+    "point loss": lambda rig: point_loss(),
     "mesh distance": lambda rig: deformed(rig, MeshDistanceDeformer),
     "regions": lambda rig: deformed(rig, RegionDeformer),
     "linear svm": lambda rig: (svm("linear"), (FRAMES,)),
@@ -103,7 +113,7 @@ def test_a_module_gives_on_a_second_device_what_it_gives_on_the_processor(part, 
     wanted = module(*given)
     with second_device():
         moved = copy.deepcopy(module).to(DEVICE)
-        made = moved(*(x.to(DEVICE) if isinstance(x, torch.Tensor) else x for x in given))
+        made = moved(*(x.to(DEVICE) if isinstance(x, torch.Tensor | Batch) else x for x in given))
         several = isinstance(wanted, tuple)
         for there, here in zip(made if several else [made], wanted if several else [wanted], strict=True):
             assert isinstance(there, Elsewhere)

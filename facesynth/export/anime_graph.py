@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays
+from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
@@ -16,6 +16,7 @@ from facesynth.inference.anime_graph.hearing import RATE
 from facesynth.inference.closures import LONGEST_CLOSING_S
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
+from facesynth.methods.learn.expectation import BANDS
 from facesynth.speech.mel import LogMel
 
 
@@ -38,9 +39,11 @@ def anime_graph_content(model: AnimeGraph) -> Content:
     if len(maps.pairs):
         graphs.append(emotion_maps_graph(maps, model.fps))
         arrays["dropped"] = maps.dropped.numpy()
+    told: dict[str, Any] = {}
     if model.predictor is not None:
+        told = {"expectation": predictor_settings(model.predictor)}
         arrays |= predictor_arrays(model.predictor)
-        graphs += [expectation_graph(model.predictor, unit), log_mel_graph(LogMel())]
+        graphs += [expectation_graph(model.predictor, unit), log_mel_graph(LogMel(bands=BANDS))]
     return Content(
         graphs=tuple(graphs),
         settings={
@@ -55,7 +58,8 @@ def anime_graph_content(model: AnimeGraph) -> Content:
             "no_map": model.facts["no_map"],
             "temperature": model.config["temperature"],
             "sharpening": model.config["sharpening"],
-        },
+        }
+        | told,
         latency={
             "look_ahead_s": None,
             "look_ahead_phones": 4,

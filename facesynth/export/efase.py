@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, sound_arrays
+from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, sound_arrays
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph
 from facesynth.export.motion_graphs import decode_graph, encode_graph
@@ -19,6 +19,7 @@ from facesynth.inference.efase.exported import stored_nodes
 from facesynth.inference.efase.nodes import COLUMNS
 from facesynth.inference.efase.stream import GUARD_S
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.learn.expectation import BANDS
 from facesynth.speech.mel import LogMel
 
 LATENCY = {
@@ -40,6 +41,7 @@ def efase_content(model: Efase) -> Content:
         "names": np.frombuffer("\n".join(model.facts["names"]).encode(), np.uint8),
     }
     heard, graphs = _hearing(model)
+    told = {} if model.audio.predictor is None else {"expectation": predictor_settings(model.audio.predictor)}
     mean, basis = model.pca.mean.cpu().numpy(), model.pca.basis.cpu().numpy()
 
     def decoded(coordinates: NDArray[Any]) -> NDArray[Any]:
@@ -64,7 +66,8 @@ def efase_content(model: Efase) -> Content:
             "speaking": asdict(model.settings()),
             "sound_weight": sound_weight,
             "pose_weight": pose_weight,
-        },
+        }
+        | told,
         sample_rate=LogMel().sample_rate if graphs else None,
         latency=LATENCY,
         arrays=arrays | heard,
@@ -89,5 +92,5 @@ def _hearing(model: Efase) -> tuple[dict[str, NDArray[Any]], list[Graph]]:
         arrays |= predictor_arrays(model.audio.predictor)
         graphs.append(expectation_graph(model.audio.predictor, model.fitted_layout.unit))
     if not model.audio.empty:
-        graphs.append(log_mel_graph(LogMel()))
+        graphs.append(log_mel_graph(LogMel(bands=BANDS)))
     return arrays, graphs

@@ -12,40 +12,52 @@ from facesynth.inference.efase.exported import SOUND
 from facesynth.methods.efase.audio import PhoneSound
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
-from facesynth.methods.learn.network import RATE
+from facesynth.methods.learn.pose_network import REACH, CausalBlock
 
 
 def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
-    """Bands, phones and emotions [B, T, W] to expected coordinates [B, T, D]."""
-    layers = [layer for layer in predictor.network if isinstance(layer, torch.nn.Conv1d)]
-    wide, narrow = layers[0].weight.shape[1], layers[-1].weight.shape[0]
+    """Bands, phones and emotions [B, T, W] to expected coordinates [B, T, D]: frame t by what was told up to t."""
+    network, reading = predictor.network, predictor.reading
     b = Builder("expectation")
-    heard = Port("heard", "float32", ("batch", "frames", wide), "standardised", RATE)
+    heard = Port("heard", "float32", ("batch", "frames", reading.width), "standardised", reading.rate)
     value = b.op("Transpose", b.input(heard.name, heard.dtype, heard.shape), perm=[0, 2, 1])
-    for number, layer in enumerate(layers):
-        value = b.op("Relu", value) if number else value
-        value = _convolved(b, value, layer)
-    value = b.op("Mul", b.op("Transpose", value, perm=[0, 2, 1]), b.constant(predictor.scale.cpu().numpy()))
-    poses = Port("poses", "float32", ("batch", "frames", narrow), f"components of {unit}", RATE)
-    b.output(value, poses.name, poses.dtype, poses.shape)
+    value = b.op("Gelu", _causal(b, value, network.first))
+    for block in network.blocks.children():
+        value = b.op("Add", value, _changed(b, value, block))  # type: ignore[arg-type]  # all of them are CausalBlock
+    poses = b.op("Transpose", _causal(b, value, network.poses), perm=[0, 2, 1])
+    value = b.op("Add", b.op("MatMul", poses, b.constant(predictor.into.cpu().numpy())), b.constant(predictor.onto.cpu().numpy()))
+    port = Port("poses", "float32", ("batch", "frames", len(predictor.onto)), f"coordinates of motion in {unit}", reading.rate)
+    b.output(value, port.name, port.dtype, port.shape)
 
     def example(batch: int, count: int, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
-        return {"heard": rng.standard_normal((batch, count, wide)).astype(np.float32)}
+        return {"heard": rng.standard_normal((batch, count, reading.width)).astype(np.float32)}
 
     def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        with torch.no_grad():
-            predicted = predictor.network(torch.from_numpy(arrays["heard"]).transpose(1, 2)).transpose(1, 2)
-            return [(predicted * predictor.scale).numpy()]
+        told = torch.from_numpy(arrays["heard"]).to(predictor.scale.device)
+        return [torch.stack([predictor(one) for one in told]).cpu().numpy()]
 
     about = "the pose that sound, phones and emotion lead one to expect"
-    return Graph("expectation", about, b.model(), (heard,), (poses,), example, reference)
+    return Graph("expectation", about, b.model(), (heard,), (port,), example, reference)
 
 
-def _convolved(b: Builder, value: str, layer: torch.nn.Conv1d) -> str:
+def _changed(b: Builder, value: str, block: CausalBlock) -> str:
+    """What a block adds to [B, width, T]."""
+    weight, bias = (b.constant(part.detach().cpu().numpy()) for part in (block.norm.weight, block.norm.bias))
+    normed = b.op("LayerNormalization", b.op("Transpose", value, perm=[0, 2, 1]), weight, bias, axis=-1, epsilon=block.norm.eps)
+    return _causal(b, b.op("Gelu", _causal(b, b.op("Transpose", normed, perm=[0, 2, 1]), block.spread)), block.mix)
+
+
+def _causal(b: Builder, value: str, layer: torch.nn.Conv1d) -> str:
     dilation = int(layer.dilation[0])
     reach = dilation * (int(layer.kernel_size[0]) - 1)
     weight, bias = (b.constant(part.detach().cpu().numpy()) for part in (layer.weight, layer.bias))  # type: ignore[union-attr]
-    return b.op("Conv", value, weight, bias, dilations=[dilation], pads=[reach // 2, reach - reach // 2])
+    return b.op("Conv", value, weight, bias, dilations=[dilation], pads=[reach, 0])
+
+
+def predictor_settings(predictor: PosePredictor) -> dict[str, Any]:
+    """How the graph is asked; `inference.expectation.exported_expectation` reads it."""
+    reading = predictor.reading
+    return {"rate": reading.rate, "phones": reading.phones, "before": REACH, "ahead": predictor.ahead}
 
 
 def predictor_arrays(predictor: PosePredictor) -> dict[str, NDArray[Any]]:
@@ -60,5 +72,5 @@ def sound_arrays(sound: PhoneSound) -> dict[str, NDArray[Any]]:
 
 
 def _standard(hearing: Hearing, name: str) -> dict[str, NDArray[Any]]:
-    """Mean and deviation [40] of the bands."""
+    """Mean and deviation [B] of the bands."""
     return {f"{name}_mean": hearing.mean.cpu().numpy(), f"{name}_deviation": hearing.deviation.cpu().numpy()}

@@ -134,6 +134,17 @@ def _bends(signal: Floats) -> Floats:
     return bends
 
 
+def cubic_at(signal: Floats, at: Floats) -> Floats:
+    """Frames [T, C] read at places [n] in 0..T-1 by the cubic of the four frames around each (Catmull-Rom); ends are held.
+
+    Nearly as smooth as `spline_at`, and a place is known when two frames after it are: a stream gives what the whole gives.
+    """
+    low = np.floor(at + 1e-9).astype(np.int64)
+    t = np.clip(at - low, 0, 1)[:, None]
+    a, b, c, d = (signal[np.clip(low + step, 0, len(signal) - 1)] for step in (-1, 0, 1, 2))
+    return np.asarray(b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a))))
+
+
 def at_rate(frames: Floats, fps: float, new_fps: float, at: Floats) -> Floats:
     """Frames [T, C] read at places [n] in old frames; movement that the new rate cannot carry is filtered out first."""
     if falls(fps, new_fps) and len(frames) > 1:

@@ -8,6 +8,7 @@ from .errors import FacesynthError, unknown
 from .folder import open_folder, stated_by_manifest
 
 _MODELS = {
+    "network": ".network:load_network",
     "lds": ".lds:load_lds",
     "emotion": ".emotion:load_detector",
     "efase": ".efase.exported:load_efase",

@@ -37,6 +37,7 @@ BUILT_IN = {
         "head_knn": "head_knn.capabilities:CAPABILITIES",
         "head_hmm": "head_hmm.capabilities:CAPABILITIES",
         "tcn": "baselines.capabilities:TCN",
+        "network": "network.capabilities:CAPABILITIES",
         "anime_graph": "anime_graph.capabilities:CAPABILITIES",
         "efase": "efase.capabilities:CAPABILITIES",
     }.items()

@@ -126,7 +126,7 @@ def test_the_prediction_repeats_by_seed_and_leaves_torch_alone(halves, monkeypat
     state = torch.random.get_rng_state()
     for seed in (0, 0, 1):
         model = Efase(pose_weight=1.0).fit(halves[0].subset(halves[0].ids[:4]), seed=seed)
-        weights.append(model.audio.predictor.network[0].weight)
+        weights.append(model.audio.predictor.network.first.weight)
     assert torch.equal(weights[0], weights[1])
     assert not torch.equal(weights[0], weights[2])
     assert torch.equal(state, torch.random.get_rng_state())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..checks import checked_rate
 from ..closures import close_at
 from ..errors import FacesynthError, reject_options, unknown
-from ..expectation import Bands, Expectation
+from ..expectation import Bands, Expectation, Said
 from ..filters import sharpen
 from ..layout import Layout
 from ..lips import bilabial_spans
@@ -120,8 +120,8 @@ class AnimeGraph:
         bounds = speech.phones.frame_bounds(self.fps)
         poses: list[Floats | None] = [None] * len(said)
         if self.expectation is not None and self.bands is not None:
-            ends_s, count = speech.phones.ends_s, int(bounds[-1])
-            found = self.expectation.poses(self.bands(speech), said.tolist(), ends_s, felt.tolist(), self.fps, count)
+            told = Said.numbered(said.tolist(), speech.phones.ends_s, felt.tolist(), len(self.emotions))
+            found = self.expectation.poses(self.bands(speech), told, self.fps, int(bounds[-1]))
             poses = list(np.split(found, bounds[1:-1]))
         asked = zip(each, heard, np.diff(bounds).tolist(), poses, strict=True)
         return [Wish(phone, emotion, features[a:b], count, pose) for (phone, emotion), (a, b), count, pose in asked]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..efase.nodes import Floats, Ints, Nodes
 from ..efase.steps import squared_distances
-from ..expectation import Bands, Expectation, Single, Standard
+from ..expectation import Bands, Expectation, Said, Single, Standard
 from ..phones import PHONES, SILENCE
 from ..products import product
 from ..speech import PhoneTrack, Speech
@@ -45,15 +45,15 @@ class PhoneSounds:
     nodes: NDArray[np.floating]
     """[N, A] of every node."""
     centre: Single
-    """[200]"""
+    """[PLACES * B]"""
     basis: Single
-    """[200, A]"""
+    """[PLACES * B, A]"""
     size: Single
     """[A] what each component is divided by."""
     standard: Standard
 
     def of(self, bands: Single, phones: PhoneTrack) -> Floats:
-        """[P, A] the sound of each phone of a speech with these bands [F, 40]."""
+        """[P, A] the sound of each phone of a speech with these bands [F, B]."""
         spans = phone_spans(bands, phones, self.standard)
         return (((spans - self.centre) @ self.basis) / self.size).astype(np.float64)
 
@@ -63,7 +63,7 @@ class PhoneSounds:
 
 
 def phone_spans(bands: Single, phones: PhoneTrack, standard: Standard) -> Single:
-    """[P, PLACES * 40] standardised bands over each phone and a little around it."""
+    """[P, PLACES * B] standardised bands over each phone and a little around it."""
     places = np.linspace(*SPAN, PLACES)
     times_s = phones.starts_s[:, None] + places * (phones.ends_s - phones.starts_s)[:, None]
     return standard.at(bands, times_s).reshape(len(phones), -1)
@@ -133,8 +133,13 @@ class Hearing:
             sounds = self.sounds.of(bands, speech.phones)
             costs[spoken] += self.sound_weight * self.rows("sound", self.sounds.distances, sounds[spoken])
         if self.expectation is not None and self.distances is not None:
-            said = [PHONES.index(label) for label in labels]
-            poses = self.expectation.poses(bands, said, speech.phones.ends_s, felt.tolist(), fps, int(bounds[-1]))
+            said = Said.numbered(
+                [PHONES.index(label) for label in labels],
+                speech.phones.ends_s,
+                felt.tolist(),
+                self.expectation.reading.emotion_count,
+            )
+            poses = self.expectation.poses(bands, said, fps, int(bounds[-1]))
             asked = np.flatnonzero(spoken & (np.diff(bounds) > 0))
             pieces = [poses[bounds[t] : bounds[t + 1]] for t in asked]
             if pieces:

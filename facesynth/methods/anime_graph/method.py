@@ -227,7 +227,7 @@ class AnimeGraph(Method):
             closed_gap=np.inf if gap is None else float(gap),
             utterances=tuple(self.facts["utterances"]),
             bands=None if self.predictor is None else self.predictor.hearing.bands,
-            expectation=None if self.predictor is None else self.predictor.expectation(len(self.emotions)),
+            expectation=None if self.predictor is None else self.predictor.expectation(),
             temperature=config["temperature"],
             sharpening=config["sharpening"],
             help_pairs=config["help_pairs"],

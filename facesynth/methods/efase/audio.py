@@ -10,7 +10,7 @@ from facesynth.corpus import Corpus, node_name
 from facesynth.inference.efase.hearing import Hearing, PhoneSounds, PoseDistances, phone_spans
 from facesynth.inference.efase.nodes import Ints, Nodes
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.learn.expectation import PosePredictor
+from facesynth.methods.learn.expectation import BANDS, PosePredictor
 from facesynth.methods.learn.hearing import Hearing as Bands
 from facesynth.motion.pca import Pca
 
@@ -28,7 +28,7 @@ class PhoneSound(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.hearing = Bands()
+        self.hearing = Bands(bands=BANDS)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.register_buffer("nodes", torch.zeros(0, 0))
         self.register_buffer("size", torch.ones(0))
@@ -98,7 +98,7 @@ class AudioTerms(nn.Module):
                     raise FacesynthError(f"this model learned no {name}; train it with audio_weight or pose_weight above 0")
                 setattr(self, name, getattr(other, name))
 
-    def heard_by(self, nodes: Nodes, emotion_count: int, weights: tuple[float, float]) -> Hearing | None:
+    def heard_by(self, nodes: Nodes, weights: tuple[float, float]) -> Hearing | None:
         """What the search hears with, if it hears at all; weights of sound and pose."""
         learned = self.sound or self.predictor
         if learned is None:
@@ -106,6 +106,6 @@ class AudioTerms(nn.Module):
         sounds = self.sound.sounds() if self.sound is not None else None
         expectation = distances = None
         if self.predictor is not None:
-            expectation = self.predictor.expectation(emotion_count)
+            expectation = self.predictor.expectation()
             distances = PoseDistances(nodes, self.predictor.metric.cpu().numpy())
         return Hearing(learned.hearing.bands, sounds, weights[0], expectation, distances, weights[1])

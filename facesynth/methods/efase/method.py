@@ -204,7 +204,7 @@ class Efase(Method):
                     bounds={name: getattr(self, name).cpu().numpy() for name in TABLES},
                     settings=self.settings(),
                     decode=self._decode,
-                    hearing=self.audio.heard_by(nodes, len(self.emotions), self.audio_weights()),
+                    hearing=self.audio.heard_by(nodes, self.audio_weights()),
                     engine=self._engine(),
                 )
             )

@@ -1,79 +1,172 @@
-"""What the sound and the phones together lead one to expect of the face: a small network, learned with the database.
+"""The expected pose: one network for every method that expects one, and for the method that shows nothing else.
 
-It predicts the average, which moves too little; the search uses it to tell which captured nodes fit what is heard.
+It predicts the pose in the middle of those that a sound may go with, which moves too little; a search uses it to tell which
+captured nodes fit what is heard.
 """
 
 from collections.abc import Callable
+from copy import deepcopy
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.expectation import Expectation, Single, heard
-from facesynth.inference.phones import PHONES
-from facesynth.methods.learn.frames import complete
-from facesynth.methods.learn.hearing import Hearing
-from facesynth.methods.learn.network import RATE, STEPS, Tracks, network, train
-from facesynth.motion.resample import resample
+from facesynth.inference.expectation import Expectation, Reading, Said, Single, rate_of
+from facesynth.inference.layout import Layout
+from facesynth.methods.learn.frames import complete, complete_frames
+from facesynth.methods.learn.hearing import Features, Hearing
+from facesynth.methods.learn.point_loss import PointLoss
+from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
+from facesynth.methods.learn.windows import Recording, Windows
+from facesynth.motion.pca import Pca
+from facesynth.progress import track
+
+BANDS = 64
+"""Of the sound."""
+COMPONENTS = 30
+"""Of the motion, that are predicted."""
+STEPS = 700
+"""Of the training, unless told otherwise."""
+LEARNING_RATE, WEIGHT_DECAY, WARMING = 2e-3, 1e-2, 0.1
+"""The rate rises over this share of the steps and then falls along a cosine."""
+LARGEST_GRADIENT = 1.0
+AVERAGED, SETTLING = 0.99, 10
+"""Weights are averaged over about a hundred steps, fewer at the start."""
 
 
 class PosePredictor(nn.Module):
-    """From log-mel bands, phones and emotion to coordinates of the motion: four 1-D convolutions that reach ±240 ms."""
+    """From sound, phones and emotion to the pose that is to be expected, and how sure that is.
 
+    features: what is heard, see `Hearing`. phones: whether the network is told what is said. look_ahead_s: how much of the
+    sound after a frame it may hear; None for as much as it hears before (0.7 s at 25 frames a second).
+    """
+
+    fps: Tensor
+    """[1] rate of the motion that was learned, Hz."""
+    emotion_count: Tensor
+    """[1] emotions that it knows."""
     scale: Tensor
-    """[1] largest standard deviation of a coordinate."""
+    """[1] standard deviation of the first component."""
+    into: Tensor
+    """[R, D] components to the coordinates that were asked for …"""
+    onto: Tensor
+    """[D] … and where these are when all components are 0."""
     metric: Tensor
     """[D] how much a squared difference of each coordinate counts."""
 
-    def __init__(self) -> None:
+    def __init__(self, features: Features = "log_mel", *, phones: bool = True, look_ahead_s: float | None = None) -> None:
         super().__init__()
-        self.hearing = Hearing()
-        self.network = network(1, 1, seed=0)
-        self.register_buffer("scale", torch.ones(1))
+        self.phones, self.look_ahead_s = phones, look_ahead_s
+        self.hearing = Hearing(features, BANDS)
+        self.pca = _no_components()
+        self.network = PoseNetwork(1, 1)
+        for name, start in (("scale", torch.ones(1)), ("into", torch.zeros(0, 0)), ("onto", torch.zeros(0))):
+            self.register_buffer(name, start)
         self.register_buffer("metric", torch.ones(0))
+        self.register_buffer("fps", torch.full((1,), 25.0, dtype=torch.float64))
+        self.register_buffer("emotion_count", torch.ones(1, dtype=torch.int64))
 
-    def learn(self, corpus: Corpus, encode: Callable[[Tensor], Tensor], seed: int) -> None:
-        """AdamW on the squared error of the complete frames; the same seed gives the same weights on one machine.
+    def learn(self, corpus: Corpus, encode: Callable[[Tensor], Tensor], seed: int, steps: int | None = None) -> None:
+        """Prepare, then train; the same seed gives the same weights on one machine with the same number of threads.
 
-        encode: frames [T, C] to the coordinates [T, D] that are to be predicted, whose distances are those of frames.
+        encode: frames [T, C] to the coordinates [T, D] that are asked for, an affine map.
         """
-        self.hearing.learn(corpus)
-        tracks = [self._tracks(utterance, corpus.emotions, encode) for utterance in corpus]
-        everything = torch.cat([t.moved[t.present > 0] for t in tracks])
-        self.scale = everything.std(dim=0).max().clamp(min=1e-6).reshape(1)
-        self.metric = everything.new_ones(everything.shape[1])
-        tracks = [t._replace(moved=t.moved / self.scale) for t in tracks]
-        self.network = network(tracks[0].heard.shape[1], everything.shape[1], seed).to(self.scale.device)
-        train(self.network, tracks, STEPS, seed, "learning what is expected")
+        windows = self.prepare(corpus, seed)
+        self.answer_in(encode)
+        self.network = train(self.network, self.loss(corpus.layout), windows, steps or STEPS, seed)
+        self.pca = _no_components()  # `into` and `onto` say the rest
         self.eval()
+
+    def prepare(self, corpus: Corpus, seed: int) -> Windows:
+        """Everything but the network's weights, which start anew; what these are to be trained on."""
+        device = self.scale.device
+        self.fps = torch.full_like(self.fps, corpus.fps)
+        self.emotion_count = torch.full_like(self.emotion_count, len(corpus.emotions))
+        self.hearing.learn(corpus)
+        frames = complete_frames(corpus)
+        self.pca = Pca.fit(frames, COMPONENTS).to(device)
+        self.scale = self.pca.encode(torch.from_numpy(frames).to(device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
+        self.network = PoseNetwork(self.reading.width, self.pca.basis.shape[1], seed=seed).to(device)
+        return Windows([self.recording(utterance, corpus.emotions) for utterance in corpus], self.reading, self.ahead)
+
+    def loss(self, layout: Layout) -> PointLoss:
+        """What is to be made small."""
+        return PointLoss(layout, self.pca.basis * self.scale, float(self.scale) / len(layout.names) ** 0.5)
+
+    def answer_in(self, encode: Callable[[Tensor], Tensor]) -> None:
+        """Let the network's components be told in other coordinates: the affine map of frames that `encode` is."""
+        self.onto = encode(self.pca.mean[None])[0].float().clone()
+        self.into = (encode(self.pca.mean + self.scale * self.pca.basis.T) - self.onto).float()
+        self.metric = self.onto.new_ones(len(self.onto))
+
+    @property
+    def reading(self) -> Reading:
+        """What the network is told."""
+        return Reading(self.hearing.standard(), rate_of(float(self.fps)), self.phones, int(self.emotion_count))
+
+    @property
+    def ahead(self) -> int:
+        """Frames by which its input runs ahead."""
+        return frames_ahead(self.look_ahead_s, rate_of(float(self.fps)))
 
     @torch.no_grad()
     def forward(self, told: Tensor) -> Tensor:
-        """[F, 40 + phones + emotions] what the network is told to coordinates [F, D]."""
-        predicted: Tensor = self.network(told.T[None])[0].T * self.scale
-        return predicted
+        """[F, W] what the network is told to coordinates [F, D]."""
+        poses: Tensor = self.network(told[None])[0][0] @ self.into + self.onto
+        return poses
 
-    def expectation(self, emotion_count: int) -> Expectation:
+    def expectation(self) -> Expectation:
         """What a search takes of it."""
 
         def predict(told: Single) -> Single:
             found: Single = self(torch.from_numpy(told).to(self.scale.device)).cpu().numpy()
             return found
 
-        return Expectation(predict, self.hearing.standard(), emotion_count)
+        return Expectation(predict, self.reading, REACH, self.ahead)
 
-    def _tracks(self, utterance: Utterance, emotions: tuple[str, ...], encode: Callable[[Tensor], Tensor]) -> Tracks:
-        speech, motion = utterance.speech, resample(utterance.motion, RATE)
-        said = [PHONES.index(label) for label in speech.phones.labels]
-        felt = [emotions.index(e) for e in speech.emotions.per_phone(speech.phones)[0]]
-        bands, times_s = self.hearing.bands(speech), np.arange(len(motion)) / RATE
-        told: NDArray[np.float32] = heard(
-            bands, said, speech.phones.ends_s, felt, times_s, self.hearing.standard(), len(emotions)
-        )
-        frames, present, said_and_heard = (
-            torch.from_numpy(array).to(self.scale.device)
-            for array in (np.nan_to_num(motion.frames), complete(motion.frames), told)
-        )
-        return Tracks(said_and_heard, encode(frames).float() * present[:, None], present.float())
+    def recording(self, utterance: Utterance, emotions: tuple[str, ...]) -> Recording:
+        """What one utterance teaches."""
+        frames, present = utterance.motion.frames, complete(utterance.motion.frames)
+        filled = np.where(present[:, None], frames, self.pca.mean.cpu().numpy())
+        poses = self.pca.encode(torch.from_numpy(filled.astype(np.float32)).to(self.scale.device)) / self.scale
+        bands, said = self.hearing.bands(utterance.speech), Said.of(utterance.speech, emotions)
+        return Recording(bands, said, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps)
+
+
+def _no_components() -> Pca:
+    return Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
+
+
+def train(network: PoseNetwork, loss: PointLoss, windows: Windows, steps: int, seed: int) -> PoseNetwork:
+    """AdamW on windows drawn by seed; what comes back has the averaged weights."""
+    device, rng = next(network.parameters()).device, np.random.default_rng(seed)
+    averaged, (optimiser, schedule) = deepcopy(network), learning(network, steps)
+    network.train()
+    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):  # dropout draws from torch's own generator
+        torch.manual_seed(seed)
+        for step in track(range(steps), "learning what is expected", steps):
+            batch = windows.draw(rng).to(device)
+            optimiser.zero_grad()
+            missed: Tensor = loss(*network(batch.told), batch)
+            missed.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
+            nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
+            optimiser.step()
+            schedule.step()
+            average(averaged, network, step)
+    return averaged.eval()
+
+
+def learning(network: nn.Module, steps: int) -> tuple[torch.optim.AdamW, torch.optim.lr_scheduler.OneCycleLR]:
+    """The optimiser, and how its rate goes."""
+    optimiser = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    total = max(steps, 2)
+    return optimiser, torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=total, pct_start=WARMING)
+
+
+@torch.no_grad()
+def average(averaged: nn.Module, network: nn.Module, step: int) -> None:
+    """Draw averaged weights towards those after a step: an exponential mean, which at the start is a plain one."""
+    share = 1 - min(AVERAGED, (step + 1) / (step + SETTLING))
+    for mean, newest in zip(averaged.parameters(), network.parameters(), strict=True):
+        mean.lerp_(newest, share)

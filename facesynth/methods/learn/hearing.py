@@ -17,7 +17,9 @@ from facesynth.speech.mel import LogMel
 from facesynth.speech.phone_network import WIDTH, phone_network
 
 Features = Literal["log_mel", "phone_net", "both"]
-WIDTHS = {"log_mel": 40, "phone_net": WIDTH, "both": 40 + WIDTH}
+BANDS = 40
+"""Log-mel bands, unless told otherwise."""
+WIDTHS = {"log_mel": BANDS, "phone_net": WIDTH, "both": BANDS + WIDTH}
 HIDDEN_LAYER = 2
 """The third block's output: it tells visemes best of the four, for speakers that a regression never heard."""
 
@@ -25,8 +27,8 @@ HIDDEN_LAYER = 2
 class Hearing(nn.Module):
     """Features of a speech at any times, each with mean 0 and deviation 1 over the training speech.
 
-    features: 40 log-mel bands, or what the phone network makes of the sound (`phone_net`), which depends less on who speaks,
-    or both. FacesynthError for any other.
+    features: log-mel bands, 40 unless told otherwise, or what the phone network makes of the sound (`phone_net`), which
+    depends less on who speaks, or both. FacesynthError for any other.
     """
 
     mean: Tensor
@@ -34,12 +36,13 @@ class Hearing(nn.Module):
     deviation: Tensor
     """[W]"""
 
-    def __init__(self, features: Features = "log_mel") -> None:
+    def __init__(self, features: Features = "log_mel", bands: int = BANDS) -> None:
         super().__init__()
         if features not in WIDTHS:
             raise unknown("features", features, WIDTHS)
-        self.features, self.width = features, WIDTHS[features]
-        self.mel = LogMel(bands=40)
+        self.features = features
+        self.width = WIDTHS[features] + (0 if features == "phone_net" else bands - BANDS)
+        self.mel = LogMel(bands=bands)
         self.register_buffer("mean", torch.zeros(self.width))
         self.register_buffer("deviation", torch.ones(self.width))
 
@@ -61,10 +64,13 @@ class Hearing(nn.Module):
         """Mean and deviation as arrays."""
         return Standard(self.mean.cpu().numpy(), self.deviation.cpu().numpy())
 
-    @torch.no_grad()
     def bands(self, speech: Speech) -> NDArray[np.float32]:
         """[F, W] of a speech, not standardised, a frame every 10 ms."""
-        audio = np.ascontiguousarray(resample(speech.audio, speech.sample_rate, self.mel.sample_rate))
+        return self.of_sound(np.ascontiguousarray(resample(speech.audio, speech.sample_rate, self.mel.sample_rate)))
+
+    @torch.no_grad()
+    def of_sound(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same of sound [S] at 16 kHz."""
         if self.features == "phone_net":
             return _hidden(audio, 1 + len(audio) // self.mel.hop)
         heard: NDArray[Any] = self.mel(torch.from_numpy(audio).to(self.mel.window.device)).cpu().numpy()

@@ -7,10 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from facesynth.inference.expectation import POSES_FPS
 from facesynth.progress import track
 
-RATE = POSES_FPS
+RATE = 50.0
 """Frames that the network reads per second, Hz: the 20 ms of the ridge's 21 frames."""
 WIDTH, KERNEL, DROPOUT = 128, 5, 0.3
 DILATIONS = (1, 1, 2, 2)

@@ -1,0 +1,175 @@
+"""The network of poses: speech in, frames out, at once or as the sound comes in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .checks import checked_piece, checked_rate, require_open
+from .closures import close_at
+from .errors import FacesynthError, reject_options, unknown
+from .expectation import BANDS_FPS, BEYOND, EACH, RATE, Expectation, Said, Single, exported_expectation
+from .filters import cubic_at, sharpen
+from .folder import Folder
+from .graphs import Graph
+from .layout import Layout
+from .lips import bilabial_spans
+from .motion import Motion
+from .phones import PHONE_INDEX, SILENCE
+from .sound import resample
+from .speech import NEUTRAL, Speech
+
+HOP = round(RATE / BANDS_FPS)
+"""Samples from one frame of bands to the next."""
+HALF_WINDOW = 256
+"""Samples on either side of its centre that a frame of bands depends on."""
+AROUND = 3
+"""Frames of bands that are heard once more beside new ones: the first of a piece lack what came before it."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Everything that a trained network speaks with; its parts are graphs of an exported folder, or modules of torch."""
+
+    layout: Layout
+    fps: float
+    emotions: tuple[str, ...]
+    hear: Callable[[Single], Single]
+    """Sound [S] at RATE to bands [F, B]."""
+    expectation: Expectation
+    """Of frames [C]."""
+    sharpening: float = 0.0
+    closed_gap: float = np.inf
+    """How near the lips come at a p, b or m; infinite where they are left as they are."""
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+    """Of the folder that it comes from."""
+
+    @property
+    def look_ahead_s(self) -> float:
+        """In a stream frame t waits for the sound up to about t / fps + this, seconds."""
+        return self.expectation.look_ahead_s + BEYOND / self.expectation.reading.rate + HALF_WINDOW / RATE
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """Motion for speech: what is expected, sharpened, lips closed at p, b and m. Nothing is random."""
+        reject_options("network", options, ("seed",))
+        bands = self.hear(resample(speech.audio, speech.sample_rate, RATE))
+        count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
+        frames = self.expectation.poses(bands, Said.of(speech, self.emotions), self.fps, count)
+        frames = sharpen(frames, self.sharpening, self.fps)
+        frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
+        return Motion(frames.astype(np.float32), self.fps, self.layout)
+
+    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> SoundStream:
+        """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
+
+        FacesynthError for a model that is told phones, which a stream does not know. A stream is not sharpened, and closes no
+        lips.
+        """
+        if self.expectation.reading.phones:
+            raise FacesynthError("this network is told what is said and wants whole utterances; train one with phones=false")
+        felt = (NEUTRAL if NEUTRAL in self.emotions else self.emotions[0]) if emotion is None else emotion
+        if felt not in self.emotions:
+            raise unknown("emotion", felt, self.emotions)
+        checked_rate(RATE if sample_rate is None else sample_rate, RATE)
+        return SoundStream(self, self.emotions.index(felt))
+
+
+class SoundStream:
+    """`push` sound, get the frames that became final: those that `synthesize` gives without sharpening and closing of lips."""
+
+    def __init__(self, model: Network, emotion: int) -> None:
+        self.model, reading = model, model.expectation.reading
+        self._said = Said.numbered([PHONE_INDEX[SILENCE]], np.array([np.inf]), [emotion], len(model.emotions))
+        self._sound, self._first_sample = np.zeros(0, np.float32), 0
+        self._bands, self._first_band = np.zeros((0, len(reading.standard.mean)), np.float32), 0
+        self._poses, self._first_pose = np.zeros((0, model.layout.channels)), 0
+        self._given = 0
+        self._ended = False
+
+    def push(self, audio: ArrayLike) -> NDArray[np.float32]:
+        """More sound [S] at RATE; the frames [t, C] that became final."""
+        require_open(self._ended)
+        self._sound = np.concatenate([self._sound, checked_piece(audio)])
+        self._hear((self._samples - HALF_WINDOW) // HOP + 1)
+        expectation, ratio = self.model.expectation, self._ratio
+        last_s = (self._first_band + len(self._bands) - 1) / BANDS_FPS
+        known = int(np.floor(last_s * expectation.reading.rate - (EACH - 1) / (2 * EACH))) - expectation.ahead + 1
+        self._expect(known)
+        return self._give(int(np.floor((known - 1 - BEYOND) / ratio + 1e-9)) + 1)
+
+    def finish(self) -> NDArray[np.float32]:
+        """The frames that were held back: after the end there is silence. Of no sound at all, none."""
+        require_open(self._ended)
+        self._ended = True
+        if not self._samples:
+            return np.zeros((0, self.model.layout.channels), np.float32)
+        self._hear(1 + self._samples // HOP)
+        count = max(1, round(self._samples / RATE * self.model.fps))
+        self._expect(int(np.floor((count - 1) * self._ratio + 1e-9)) + 1 + BEYOND)
+        return self._give(count)
+
+    @property
+    def _samples(self) -> int:
+        """How many came in."""
+        return self._first_sample + len(self._sound)
+
+    @property
+    def _ratio(self) -> float:
+        """Frames of the network for one frame of the motion."""
+        return self.model.expectation.reading.rate / self.model.fps
+
+    def _hear(self, stop: int) -> None:
+        """Bands up to frame `stop`; sound that no later one needs is forgotten."""
+        have = self._first_band + len(self._bands)
+        if stop <= have:
+            return
+        begin = max(0, have - AROUND)
+        bands = self.model.hear(self._sound[begin * HOP - self._first_sample :])[have - begin : stop - begin]
+        self._bands = np.concatenate([self._bands, bands])
+        kept = max(0, stop - AROUND) * HOP
+        self._sound, self._first_sample = self._sound[kept - self._first_sample :], kept
+
+    def _expect(self, stop: int) -> None:
+        """Poses up to frame `stop` of the network; bands that no later one needs are forgotten."""
+        have, expectation = self._first_pose + len(self._poses), self.model.expectation
+        if stop <= have:
+            return
+        new = expectation.frames(self._bands, self._said, have, stop, self._first_band / BANDS_FPS)
+        self._poses = np.concatenate([self._poses, new])
+        needed = int((stop - expectation.before - 1) / expectation.reading.rate * BANDS_FPS) - 1
+        kept = int(np.clip(needed - self._first_band, 0, max(0, len(self._bands) - 1)))
+        self._bands, self._first_band = self._bands[kept:], self._first_band + kept
+
+    def _give(self, stop: int) -> NDArray[np.float32]:
+        at = np.arange(self._given, max(self._given, stop)) * self._ratio - self._first_pose
+        frames = cubic_at(self._poses, at) if len(at) else np.zeros((0, self.model.layout.channels))
+        self._given += len(at)
+        kept = int(np.clip(np.floor(self._given * self._ratio) - 1 - self._first_pose, 0, len(self._poses)))
+        self._poses, self._first_pose = self._poses[kept:], self._first_pose + kept
+        return frames.astype(np.float32)
+
+
+def load_network(folder: Folder, threads: int) -> Network:
+    """The model in a folder that `network_content` filled."""
+    manifest, settings, arrays = folder.manifest, folder.settings, folder.arrays()
+    graph, gap = Graph(folder, "log_mel", threads), settings["closed_gap"]
+
+    def hear(sound: Single) -> Single:
+        return np.asarray(graph(audio=sound[None])[0][0], np.float32)
+
+    return Network(
+        folder.layout,
+        float(manifest["fps"]),
+        tuple(manifest["emotions"]),
+        hear,
+        exported_expectation(folder, arrays, threads),
+        sharpening=float(settings["sharpening"]),
+        closed_gap=np.inf if gap is None else float(gap),
+        manifest=manifest,
+    )

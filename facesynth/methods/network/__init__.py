@@ -1,0 +1,1 @@
+"""The network of poses as a method of its own."""

@@ -1,0 +1,14 @@
+"""What the network of poses can do."""
+
+from __future__ import annotations
+
+from facesynth.methods.capabilities import Capabilities
+
+CAPABILITIES = Capabilities(
+    "network",
+    "dilated convolutions from sound, phones and emotion to poses",
+    home="facesynth.methods.network.method",
+    minutes=2.0,
+    reference="network",
+    exporter="facesynth.export.network:network_content",
+)

@@ -1,0 +1,99 @@
+"""The network of poses as a method: what one would train today in place of a search."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import nn
+
+from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import bilabial_spans, narrowest_gaps
+from facesynth.inference.motion import Motion
+from facesynth.inference.network import Network as Speaker
+from facesynth.inference.network import SoundStream
+from facesynth.inference.speech import Speech
+from facesynth.methods.learn.expectation import STEPS, PosePredictor
+from facesynth.methods.learn.hearing import Features
+from facesynth.methods.method import Method
+from facesynth.methods.network.capabilities import CAPABILITIES
+from facesynth.methods.registry import register
+
+
+@register(CAPABILITIES)
+class Network(Method):
+    """A residual network of dilated convolutions from sound, phones and emotion to 30 components of the motion.
+
+    Parameters
+    ----------
+    steps : int
+        Of the training.
+    phones : bool
+        Whether the network is told what is said. Without, sound alone is enough, and is what streams as it comes in.
+    look_ahead_s : float
+        How much of the sound after a frame the network may hear, seconds; 0 or more. At most as much as it hears before
+        (0.7 s at 25 frames a second), which is also what a negative one stands for.
+    features : str
+        What is heard: `log_mel`, `phone_net` or `both`.
+    sharpening : float
+        How much quick movement is raised: the pose in the middle of the likely ones moves too little.
+    close_lips : bool
+        Whether lips come as near to each other at p, b and m as they were recorded to.
+    """
+
+    def __init__(
+        self,
+        steps: int = STEPS,
+        phones: bool = True,
+        look_ahead_s: float = -1.0,
+        features: Features = "log_mel",
+        sharpening: float = 0.0,
+        close_lips: bool = False,
+    ) -> None:
+        super().__init__()
+        if steps < 1 or not 0 <= sharpening < float("inf") or not look_ahead_s < float("inf"):
+            raise FacesynthError(
+                "network needs at least one step of training, a sharpening of 0 or more and a finite look-ahead; "
+                f"got {steps}, {sharpening} and {look_ahead_s}"
+            )
+        ahead = None if look_ahead_s < 0 else look_ahead_s
+        self.predictor = PosePredictor(features, phones=phones, look_ahead_s=ahead)
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Learn from the complete frames of a corpus."""
+        self.learned_from(corpus)
+        self.predictor.learn(corpus, nn.Identity(), seed, self.config["steps"])
+        gaps = [
+            gap
+            for utterance in corpus
+            for gap in narrowest_gaps(utterance.motion.frames, corpus.layout, bilabial_spans(utterance.speech.phones, corpus.fps))
+        ]
+        self.facts["closed_gap"] = float(np.median(gaps)) if gaps else None
+        return self.to(self.device).eval()
+
+    def speaker(self) -> Speaker:
+        """What speaks, as an exported folder does."""
+        gap = self.facts.get("closed_gap") if self.config["close_lips"] else None
+        return Speaker(
+            self.fitted_layout,
+            self.fps,
+            self.emotions,
+            self._hear,
+            self.predictor.expectation(),
+            sharpening=self.config["sharpening"],
+            closed_gap=np.inf if gap is None else gap,
+        )
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """Motion for new speech; nothing is random."""
+        self.refuse(options)
+        return self.speaker().synthesize(speech)
+
+    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> SoundStream:
+        """Sound in pieces, frames as soon as they are final; see `inference.network`."""
+        return self.speaker().stream(emotion=emotion, sample_rate=sample_rate)
+
+    def _hear(self, sound: NDArray[np.float32]) -> NDArray[np.float32]:
+        return self.predictor.hearing.of_sound(sound)

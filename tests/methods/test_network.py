@@ -1,0 +1,196 @@
+"""The network of poses: what it learns, that it looks no further than it says, that streams and folders give the same."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from corpora import tiny_corpus, tiny_layout
+
+import facesynth
+from facesynth.export.models import export_model
+from facesynth.inference.errors import FacesynthError
+from facesynth.inference.expectation import rate_of
+from facesynth.inference.filters import cubic_at
+from facesynth.inference.loading import load as load_folder
+from facesynth.inference.sound import resample
+from facesynth.methods.learn import windows
+from facesynth.methods.learn.expectation import PosePredictor
+from facesynth.methods.learn.point_loss import LIPS, PointLoss, lip_points
+from facesynth.methods.learn.pose_network import REACH, SYMMETRIC, PoseNetwork
+from facesynth.methods.learn.windows import Batch
+from facesynth.methods.network.method import Network
+from facesynth.methods.registry import create, load
+
+ROOT = Path(__file__).parents[2]
+RNG = np.random.default_rng(3)
+
+
+@pytest.fixture(scope="module")
+def halves(tmp_path_factory):
+    return tiny_corpus(tmp_path_factory.mktemp("network") / "corpus", utterances=12, fps=50).split(0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_steps():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(windows, "BATCH", 2)
+        yield
+
+
+@pytest.fixture(scope="module")
+def by_sound(halves):
+    return Network(steps=4, phones=False, look_ahead_s=0.08).fit(halves[0], seed=1)
+
+
+def missed(model, corpus):
+    return np.mean([np.square(model.synthesize(u.speech).frames - u.motion.frames).mean() for u in corpus])
+
+
+def test_it_learns_what_recordings_show(halves):
+    few = halves[0].subset(halves[0].ids[:3])
+    assert missed(Network(steps=60).fit(few), few) < 0.5 * missed(create("mean_face").fit(few), few)
+
+
+def test_the_same_seed_gives_the_same_network_and_torchs_own_generator_stays_as_it_was(halves):
+    before = torch.random.get_rng_state()
+    one, two, other = (Network(steps=3).fit(halves[0], seed=seed) for seed in (5, 5, 6))
+    assert torch.equal(before, torch.random.get_rng_state())
+    speech = halves[1][halves[1].ids[0]].speech
+    assert np.array_equal(one.synthesize(speech).frames, two.synthesize(speech).frames)
+    assert not np.array_equal(one.synthesize(speech).frames, other.synthesize(speech).frames)
+
+
+def test_a_frame_depends_on_no_later_one_and_on_none_further_back_than_its_reach():
+    network = PoseNetwork(3, 2).eval()
+    told = torch.from_numpy(RNG.normal(size=(1, 4 * REACH, 3))).float()
+    at = 2 * REACH
+    changed = told.clone()
+    changed[:, at] += 1
+    moved = (network(changed)[0] - network(told)[0]).abs().amax(dim=(0, 2)).detach().numpy()
+    assert list(np.flatnonzero(moved)) == list(range(at, at + REACH + 1))
+
+
+@pytest.mark.parametrize(("look_ahead_s", "frames"), [(None, SYMMETRIC), (0.0, 0), (0.16, 4), (60.0, SYMMETRIC)])
+def test_it_hears_no_further_ahead_than_it_was_told(halves, look_ahead_s, frames):
+    predictor = PosePredictor(phones=False, look_ahead_s=look_ahead_s)
+    predictor.fps = torch.tensor([25.0])
+    assert predictor.ahead == frames
+
+
+@pytest.mark.parametrize(
+    ("fps", "rate"), [(25, 25), (29.97, 29.97), (60, 30), (120, 30), (100, 100 / 3), (10, 20), (44, 44), (240, 30)]
+)
+def test_it_works_near_thirty_frames_a_second_whatever_the_recordings_have(fps, rate):
+    assert rate_of(fps) == pytest.approx(rate)
+
+
+def test_between_frames_a_cubic_is_met_exactly():
+    at = np.array([1.0, 1.25, 2.5, 3.9])
+    frames = np.stack([0.5 * np.arange(8.0) ** 2 - np.arange(8), np.arange(8.0)], axis=1)
+    np.testing.assert_allclose(cubic_at(frames, at), np.stack([0.5 * at**2 - at, at], axis=1), atol=1e-12)
+
+
+def test_a_stream_gives_what_the_whole_gives_however_it_is_cut(by_sound, halves):
+    speech = halves[1][halves[1].ids[0]].speech
+    whole = by_sound.synthesize(speech).frames
+    sound = resample(speech.audio, speech.sample_rate, 16000)
+    for pieces in ([len(sound)], [1, 7, 160, 4000, 2, 9000], list(RNG.integers(1, 3000, 400))):
+        stream, given, at = by_sound.stream(emotion=speech.emotions.labels[0]), [], 0
+        for piece in pieces:
+            given.append(stream.push(sound[at : at + piece]))
+            at += piece
+        given.append(stream.push(sound[at:]))
+        given = np.concatenate([*given, stream.finish()])
+        np.testing.assert_allclose(given[: len(whole)], whole[: len(given)], atol=1e-3)
+        assert abs(len(given) - len(whole)) <= 1
+
+
+def test_a_stream_is_as_late_as_it_says_and_remembers_no_more_than_it_needs(by_sound):
+    stream, late_s = by_sound.stream(), by_sound.speaker().look_ahead_s
+    for second in range(1, 21):
+        stream.push(0.1 * RNG.standard_normal(16000).astype(np.float32))
+        assert stream._given >= (second - late_s) * 50 - 1
+    kept = len(stream._sound), len(stream._bands), len(stream._poses)
+    assert np.all(np.array(kept) < (2000, 400, 60))
+
+
+def test_what_a_stream_cannot_know_is_refused(by_sound, halves):
+    with pytest.raises(FacesynthError, match="phones=false"):
+        Network(steps=1).fit(halves[0]).stream()
+    with pytest.raises(FacesynthError, match="joyous"):
+        by_sound.stream(emotion="joyous")
+    with pytest.raises(FacesynthError, match="44100"):
+        by_sound.stream(sample_rate=44100)
+    stream = by_sound.stream()
+    assert len(stream.finish()) == 0
+    with pytest.raises(FacesynthError, match="finished"):
+        stream.push(np.zeros(10, np.float32))
+
+
+def test_sound_alone_means_that_phones_change_nothing(by_sound, halves):
+    from dataclasses import replace
+
+    speech = halves[1][halves[1].ids[0]].speech
+    mute = replace(speech, phones=replace(speech.phones, labels=("pau",) * len(speech.phones)))
+    assert np.array_equal(by_sound.synthesize(speech).frames, by_sound.synthesize(mute).frames)
+
+
+def test_saved_and_exported_it_speaks_the_same_in_under_three_megabytes(by_sound, halves, tmp_path):
+    speech = halves[1][halves[1].ids[0]].speech
+    wanted = by_sound.synthesize(speech).frames
+    by_sound.save(tmp_path / "network.safetensors")
+    assert (tmp_path / "network.safetensors").stat().st_size < 3e6
+    assert np.array_equal(load(tmp_path / "network.safetensors").synthesize(speech).frames, wanted)
+    export_model(tmp_path / "network.safetensors", tmp_path / "folder")
+    exported = load_folder(tmp_path / "folder")
+    np.testing.assert_allclose(exported.synthesize(speech).frames, wanted, atol=1e-4 * np.abs(wanted).max())
+    stream = exported.stream(emotion=speech.emotions.labels[0])
+    frames = np.concatenate([stream.push(resample(speech.audio, speech.sample_rate, 16000)), stream.finish()])
+    np.testing.assert_allclose(frames[: len(wanted)], wanted[: len(frames)], atol=1e-4 * np.abs(wanted).max())
+
+
+def test_lips_count_four_times_and_missing_frames_not_at_all():
+    layout = tiny_layout()
+    points, lips = len(layout.names), lip_points(layout)
+    loss = PointLoss(layout, torch.eye(layout.channels), 1e-6)
+    there, none = torch.zeros(1, 4, layout.channels), torch.zeros(1, 4, layout.channels)
+    other = next(p for p in range(points) if p not in lips)
+
+    def of(point, present):
+        made = there.clone()
+        made[:, :, point * layout.dimension] = 1.0  # held: no velocity
+        batch = Batch(torch.zeros(1, 4, 1), there, present)
+        return float(loss(made, none, batch) - 0.5 * float((made**2 * present[..., None]).mean(dim=-1).sum() / present.sum()))
+
+    whole = torch.ones(1, 4)
+    assert of(lips[0], whole) / of(other, whole) == pytest.approx(LIPS, rel=1e-3)
+    gap = torch.tensor([[1.0, 0.0, 1.0, 1.0]])
+    assert of(lips[0], gap) == pytest.approx(of(lips[0], whole), rel=1e-4)
+
+
+def test_the_deviations_say_how_sure_a_pose_is(halves):
+    predictor = PosePredictor()
+    predictor.learn(halves[0], torch.nn.Identity(), seed=0, steps=20)
+    reading = predictor.reading
+    told = torch.randn(1, 200, reading.width, generator=torch.Generator().manual_seed(0))
+    deviations = predictor.network(told)[1].exp()
+    assert 0 < deviations.mean() < 1
+
+
+def test_the_script_that_shows_the_loop_learns_what_fit_learns(halves, tmp_path, monkeypatch):
+    corpus = halves[0].path
+    made = subprocess.run(
+        [sys.executable, ROOT / "train" / "network.py", corpus, "-o", tmp_path / "shown.safetensors", "--steps", "2"],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": f"{ROOT}"}, check=False,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    recorded, held_out = facesynth.Corpus.open(corpus).split(0)
+    monkeypatch.setattr(windows, "BATCH", 16)
+    fitted, shown = Network(steps=2).fit(recorded), load(tmp_path / "shown.safetensors")
+    speech = held_out[held_out.ids[0]].speech
+    np.testing.assert_allclose(shown.synthesize(speech).frames, fitted.synthesize(speech).frames, atol=1e-5)
+    assert "held out: lips" in made.stdout
