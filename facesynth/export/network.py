@@ -1,7 +1,5 @@
 """The network of poses as graphs: sound to bands, and what is told of them to frames."""
 
-from __future__ import annotations
-
 from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings
 from facesynth.export.folder import Content
 from facesynth.export.speech_graphs import log_mel_graph

@@ -126,11 +126,12 @@ class Reading:
         return np.hstack(columns).astype(np.float32)
 
 
-def _place(ends_s: Floats, number: Ints, times_s: Floats) -> Floats:
+def _place(ends_s: Floats, number: Ints, times_s: Floats) -> Single:
     """[F, 2] how far a phone has come, 0..1, and the logarithm of how long it lasts."""
     starts_s = np.concatenate([[0.0], ends_s[:-1]])[number]
     lasting_s = np.maximum(ends_s[number] - starts_s, 1e-3)
-    return np.stack([np.clip((times_s - starts_s) / lasting_s, 0, 1), np.log(lasting_s) + LOG_SECOND], axis=1)
+    come = np.clip((times_s - starts_s) / lasting_s, 0, 1)
+    return np.stack([come, np.log(lasting_s) + LOG_SECOND], axis=1).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +153,7 @@ class Expectation:
 
     def poses(self, bands: Single, said: Said, fps: float, count: int) -> Floats:
         """[count, D] at `fps`: bands [F, B] of the sound."""
-        at = np.arange(count) * (self.reading.rate / fps)
+        at = np.arange(count, dtype=np.float64) * (self.reading.rate / fps)
         return cubic_at(self.frames(bands, said, 0, int(np.floor(at[-1] + 1e-9)) + 1 + BEYOND), at)
 
     def frames(self, bands: Single, said: Said, first: int, stop: int, bands_from_s: float = 0.0) -> Floats:

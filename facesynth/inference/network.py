@@ -1,7 +1,5 @@
 """The network of poses: speech in, frames out, at once or as the sound comes in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -65,7 +63,7 @@ class Network:
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         return Motion(frames.astype(np.float32), self.fps, self.layout)
 
-    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> SoundStream:
+    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> "SoundStream":
         """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
 
         FacesynthError for a model that is told phones, which a stream does not know. A stream is not sharpened, and closes no
@@ -147,7 +145,7 @@ class SoundStream:
         self._bands, self._first_band = self._bands[kept:], self._first_band + kept
 
     def _give(self, stop: int) -> NDArray[np.float32]:
-        at = np.arange(self._given, max(self._given, stop)) * self._ratio - self._first_pose
+        at = np.arange(self._given, max(self._given, stop), dtype=np.float64) * self._ratio - self._first_pose
         frames = cubic_at(self._poses, at) if len(at) else np.zeros((0, self.model.layout.channels))
         self._given += len(at)
         kept = int(np.clip(np.floor(self._given * self._ratio) - 1 - self._first_pose, 0, len(self._poses)))

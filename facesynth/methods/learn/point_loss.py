@@ -1,7 +1,5 @@
 """What the network of poses is trained to make small: distances of points and of their velocities, lips first."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -56,7 +54,7 @@ class PointLoss(nn.Module):
         count = batch.poses.shape[1]
         predicted, log_deviations = predicted[:, -count:], log_deviations[:, -count:]
         missed = predicted - batch.poses
-        apart = (missed @ self.basis).unflatten(-1, (-1, self.dimension))  # [B, F, points, dimension]
+        apart = (missed @ self.basis).reshape(*missed.shape[:2], -1, self.dimension)  # [B, F, points, dimension]
         both = batch.present[:, 1:] * batch.present[:, :-1]
         near = self._mean_distance(apart, batch.present) + self._mean_distance(apart.diff(dim=1), both)
         return near + self._surprise(missed.detach(), log_deviations, batch.present)

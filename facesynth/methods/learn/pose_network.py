@@ -1,7 +1,5 @@
 """The network of poses: causal convolutions over what is heard and said, whose input runs ahead by what may be looked ahead."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional

@@ -1,10 +1,8 @@
 """Windows of recordings to train the network of poses on: what is told, what moved, and the changes that make it sturdy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import torch
@@ -56,9 +54,9 @@ class Batch(NamedTuple):
     present: Tensor
     """[B, WINDOW]"""
 
-    def to(self, device: torch.device) -> Batch:
+    def to(self, device: torch.device) -> Self:
         """On a device."""
-        return Batch(*(part.to(device) for part in self))
+        return type(self)(*(part.to(device) for part in self))
 
 
 class Windows:
@@ -80,7 +78,7 @@ class Windows:
         rate, tempo = self.reading.rate, 1 + rng.uniform(-TEMPO, TEMPO)
         room = max(recording.duration_s * rate - WINDOW * tempo, 0) + OVERHANG
         start = rng.uniform(-OVERHANG, room)
-        times_s = (start + tempo * np.arange(WINDOW + self.ahead)) / rate
+        times_s = (start + tempo * np.arange(WINDOW + self.ahead, dtype=np.float64)) / rate
         told = self.reading.told(recording.bands, recording.said, times_s, tempo / (EACH * rate))
         heard = EACH * len(self.reading.standard.mean)
         told[:, :heard] = self._disturbed(told[:, :heard], rng)

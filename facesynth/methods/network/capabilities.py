@@ -1,7 +1,5 @@
 """What the network of poses can do."""
 
-from __future__ import annotations
-
 from facesynth.methods.capabilities import Capabilities
 
 CAPABILITIES = Capabilities(

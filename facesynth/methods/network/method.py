@@ -1,7 +1,5 @@
 """The network of poses as a method: what one would train today in place of a search."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 import numpy as np
