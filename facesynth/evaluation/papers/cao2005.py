@@ -7,7 +7,7 @@ import numpy as np
 
 from facesynth.evaluation.cost import stopwatch
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.deng2008 import trajectories
+from facesynth.evaluation.papers.deng2008 import Stated, trajectories
 from facesynth.evaluation.papers.drawing import RECORDED, bars_figure, lines_figure, tracks_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
@@ -127,7 +127,7 @@ def spoken(material: Material) -> list[Finding]:
     """Lips of tested sentences over time, which the paper shows as frames."""
     model = learned(material)
     made = [(u, model.synthesize(u.speech, seed=material.seed)) for u in material.test]
-    return [replace(one, why="the paper shows frames alone") for one in trajectories(made, "fig. 1", "anime graph")]
+    return trajectories(made, "fig. 1", "anime graph", Stated("frames", "not shown", "the paper shows frames alone"))
 
 
 FIGURES: tuple[Figure, ...] = (

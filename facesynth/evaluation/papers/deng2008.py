@@ -1,6 +1,6 @@
 """Deng and Neumann 2008."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -97,7 +97,16 @@ def errors(material: Material) -> list[Finding]:
     return found
 
 
-def trajectories(made: Spoken, where: str, name: str = NAME, *, cheek: bool = False) -> list[Finding]:
+@dataclass(frozen=True)
+class Stated:
+    """What a paper says of trajectories."""
+
+    place: str = "quite close"
+    velocity: str = "deviates more"
+    why: str = "the paper shows one sentence, as a picture, and says that velocities deviate more"
+
+
+def trajectories(made: Spoken, where: str, name: str = NAME, stated: Stated = Stated(), *, cheek: bool = False) -> list[Finding]:
     """How far a lip point's trajectory and velocity follow the recorded ones, as correlations; the first utterance is drawn.
 
     cheek: those of a cheek too, where the layout names one.
@@ -107,15 +116,14 @@ def trajectories(made: Spoken, where: str, name: str = NAME, *, cheek: bool = Fa
         channels = drawn_channels(utterance.motion, cheek=cheek)
     except UnavailableError as reason:
         return [not_available(where, "lip trajectory", "a picture", str(reason))]
-    why = "the paper shows one sentence, as a picture, and says that velocities deviate more"
     found = []
     for label, channel in channels:
         pairs = [(u.motion.frames[:, channel], motion.frames[:, channel]) for u, motion in made]
         place = np.mean([_correlation(truth, made) for truth, made in pairs])
         speed = np.mean([_correlation(np.diff(truth), np.diff(made)) for truth, made in pairs])
         slower = f"correlation of its velocity: {'lower' if speed < place else 'not lower'}"
-        found.append(Finding(where, f"correlation of the trajectory of {label}", "quite close", f"{place:.2f}", False, why))
-        found.append(Finding(where, slower, "deviates more", f"{speed:.2f}", False, why))
+        found.append(Finding(where, f"correlation of the trajectory of {label}", stated.place, f"{place:.2f}", False, stated.why))
+        found.append(Finding(where, slower, stated.velocity, f"{speed:.2f}", False, stated.why))
     picture = trajectory_figure(utterance, {name: motion}, {name: COLOURS[1]}, channels)
     return [replace(found[0], figure=picture), *found[1:]]
 

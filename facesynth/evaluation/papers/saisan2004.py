@@ -8,7 +8,7 @@ import numpy as np
 from facesynth.evaluation.figures import as_uri
 from facesynth.evaluation.pair import distances, paired_points
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.deng2008 import Spoken, trajectories
+from facesynth.evaluation.papers.deng2008 import Spoken, Stated, trajectories
 from facesynth.evaluation.papers.drawing import lines_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
@@ -18,6 +18,7 @@ from facesynth.methods.lds.method import LDS
 from facesynth.methods.lds.plots import innovations_figure
 from facesynth.methods.registry import create
 
+SHOWN = Stated("a curve", "not shown", "the paper shows the error of one point, in pixels of its video")
 SETTINGS = {"scale": "linear", "features": 4, "lead_ms": 0.0, "own_means": False}
 OWN = "logarithmic periodogram and chosen lead, deterministic part"
 PAPERS = "the paper's features, deterministic part"
@@ -57,7 +58,7 @@ def errors(material: Material) -> list[Finding]:
     ]
     point, lines = _errors_of_a_point(rows)
     picture = lines_figure(lines, "s", f"error of {point}, {unit}", style="-")
-    return [replace(found[0], figure=picture), *found[1:], *trajectories(rows[OWN], "fig. 3", "LDS, no noise")]
+    return [replace(found[0], figure=picture), *found[1:], *trajectories(rows[OWN], "fig. 3", "LDS, no noise", SHOWN)]
 
 
 def noise(material: Material) -> list[Finding]:

@@ -11,6 +11,8 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.methods.lds.method import LDS
 
 SOURCES_SHOWN = 8
+SHARES_SHOWN = (0.001, 0.999)
+"""A histogram reaches from one to the other: a few samples lie far out."""
 
 
 def plot_orders(model: LDS, path: Path) -> None:
@@ -48,9 +50,9 @@ def innovations_figure(model: LDS) -> Any:
     for axes, edge, share, kurtosis in zip(panels, edges, cumulative, model.facts["kurtosis"], strict=False):
         density = np.diff(share) / np.diff(edge)
         axes.stairs(density, edge, fill=True)
-        v = np.linspace(edge[0], edge[-1], 200)
+        v = np.linspace(*np.interp(SHARES_SHOWN, share, edge), 200)
         axes.plot(v, _gaussian(v, edge, share), color="black", linewidth=0.8)
-        axes.set(title=f"excess kurtosis {kurtosis:.1f}", yticks=[])
+        axes.set(title=f"excess kurtosis {kurtosis:.1f}", yticks=[], xlim=(v[0], v[-1]))
     return figure
 
 
