@@ -25,12 +25,10 @@ from facesynth.corpus.record import Record
 from facesynth.evaluation.head import head_cca, head_distance
 from facesynth.evaluation.head_statistics import distances, take_apart
 from facesynth.inference.head.keys import HeadKeys
-from facesynth.inference.head.voice import prosody_of
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.learn.heads import mean_head, poses_of, sound_windows, with_head
-from facesynth.methods.learn.regression import Moments
+from facesynth.methods.learn.heads import mean_head, poses_of, with_head
 from facesynth.methods.registry import create
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -47,8 +45,6 @@ COLUMNS = (
     "pause ratio",
     "s/s",
 )
-AROUND_S = np.linspace(-0.4, 0.4, 9)
-ALPHA = 0.03
 Maker = Callable[[Utterance], NDArray]
 """From an utterance to poses [T, 6]."""
 Learner = Callable[[Corpus, list[Utterance]], Maker]
@@ -102,11 +98,11 @@ def about_mean(motion: Motion) -> Motion:
     return replace(motion, head=head)
 
 
-def zoo(method: str, config: str, *, keyed: bool = False) -> Learner:
+def zoo(method: str, config: str = "", *, keyed: bool = False) -> Learner:
     """A method of the zoo; keyed: with the true first and last pose as key poses."""
 
     def learn(train: Corpus, _: list[Utterance]) -> Maker:
-        model = create(method, **load_config(CONFIGS / config)).fit(train)
+        model = create(method, **(load_config(CONFIGS / config) if config else {})).fit(train)
 
         def make(utterance: Utterance) -> NDArray:
             given = {"head_keys": ends_of(utterance)} if keyed else {}
@@ -153,22 +149,6 @@ def elsewhere(_: Corpus, train: list[Utterance]) -> Maker:
     return make
 
 
-def ridge(_: Corpus, train: list[Utterance]) -> Maker:
-    """Linear from prosody within 0.4 s to the pose."""
-    sums = Moments.zero(6 * len(AROUND_S), 6)
-    for u in train:
-        sums.add(heard(u).astype(np.float32), poses_of(u).astype(np.float32))
-    ((weights, bias),) = sums.solutions([ALPHA])
-    return lambda u: heard(u) @ weights + bias
-
-
-def heard(u: Utterance) -> NDArray:
-    prosody = prosody_of(sound_windows(u, u.motion.fps, len(u.motion)), u.motion.fps)
-    prosody = prosody * np.repeat([1, 1 / u.motion.fps * 8, (8 / u.motion.fps) ** 2], 2)
-    at = np.arange(len(prosody))[:, None] + np.round(AROUND_S * u.motion.fps).astype(int)
-    return prosody[np.clip(at, 0, len(prosody) - 1)].reshape(len(prosody), -1)
-
-
 def seed_of(u: Utterance) -> int:
     return sum(map(ord, u.id))
 
@@ -176,7 +156,7 @@ def seed_of(u: Utterance) -> int:
 METHODS: dict[str, Learner] = {
     "recorded elsewhere": elsewhere,
     "still": still,
-    "ridge from prosody": ridge,
+    "ridge from prosody": zoo("head_ridge"),
     "sway": sway,
     "knn": zoo("head_knn", "head_knn.yaml"),
     "knn, dissertation's weights": zoo("head_knn", "head_knn_paper.yaml"),
