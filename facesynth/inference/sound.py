@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import checked_piece, require_open
 from .errors import FacesynthError
 
+BLOCK = 1 << 20
+"""Output samples that are computed at once."""
 FEW = 4
 """Output samples of a kind, under which they are gathered."""
 KAISER_BETA = 5.0
@@ -22,7 +24,13 @@ def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float3
     rate, new_rate, audio = checked_hz(rate), checked_hz(new_rate), checked_piece(audio)
     if rate == new_rate:
         return audio
-    return _resampled(audio, 0, 0, -(-len(audio) * new_rate // rate), rate, new_rate)
+    count, around = -(-len(audio) * new_rate // rate), REACH * max(1, -(-rate // new_rate)) + 2
+    parts = []
+    for start in range(0, max(1, count), BLOCK):  # sums in float64 of the whole would be four times as large as the sound
+        stop = min(start + BLOCK, count)
+        first, last = max(0, start * rate // new_rate - around), stop * rate // new_rate + around
+        parts.append(_resampled(audio[first:last], first, start, stop, rate, new_rate))
+    return np.concatenate(parts)
 
 
 class Resampler:

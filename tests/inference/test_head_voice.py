@@ -56,7 +56,7 @@ def test_silence_has_features():
     assert features.shape == (4, 31)
     assert np.isfinite(features).all()
     assert last_hz == 120
-    assert np.isfinite(voice.prosody_of(np.zeros((4, PITCH_WINDOW)), 60.0)).all()
+    assert np.isfinite(voice.prosody_of([np.zeros((4, PITCH_WINDOW))], 60.0)).all()
 
 
 def test_features_are_the_same_in_pieces():
@@ -81,7 +81,7 @@ def test_a_bridge_passes_what_is_known_and_does_not_overshoot():
 def test_prosody_does_not_know_how_loud_or_how_high_a_voice_is():
     glide = np.concatenate([vowel(VOWELS["a"], hz, 0.2) for hz in (100, 110, 125, 115, 105)])
     higher = np.concatenate([vowel(VOWELS["a"], 1.25 * hz, 0.2) for hz in (100, 110, 125, 115, 105)])
-    one, louder, up = (voice.prosody_of(windows_of(sound, 60.0), 60.0) for sound in (glide, 0.1 * glide, higher))
+    one, louder, up = (voice.prosody_of([windows_of(sound, 60.0)], 60.0) for sound in (glide, 0.1 * glide, higher))
     np.testing.assert_allclose(louder, one, atol=1e-3 * np.abs(one).max())
     assert np.corrcoef(up[5:-5, 0], one[5:-5, 0])[0, 1] > 0.9
 

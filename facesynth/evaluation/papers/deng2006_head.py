@@ -98,7 +98,7 @@ def prosody(material: Material) -> list[Finding]:
     found = []
     for utterance in (*with_head(material.train), *with_head(material.test)):
         angles = angles_at(utterance, HEARD_FPS)
-        heard = prosody_of(sound_windows(utterance, HEARD_FPS, len(angles)), HEARD_FPS)
+        heard = prosody_of([sound_windows(utterance, HEARD_FPS, len(angles))], HEARD_FPS)
         found.append(canonical_correlation(heard, angles))
     what = "canonical correlation of pitch, energy and their differences with head angles"
     return [Finding("§4.4", what, "0.7", f"{np.mean(found):.2f}", False, material.unlike)]

@@ -9,6 +9,7 @@ are the key points of a spherical cubic (eq. 4.16, 4.17).
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ Ints = NDArray[np.int64]
 HEARD_FPS = 60.0
 """Prosody frames a second: windows of 25 ms that overlap by 8.3 ms."""
 KEYS_PER_S = 6.0
+MOST_WINDOWS = 2048
+"""Heard at once."""
 LogLikelihood = Callable[..., list[NDArray[Any]]]
 """`prosody` [1, T, 6] to `log_likelihood` [1, T, N] of the states of all models."""
 
@@ -48,7 +51,7 @@ class Network:
 def most_likely(network: Network, log_likelihood: Floats) -> tuple[float, Ints]:
     """Log probability of the most likely way through the network, and its states [T] (Viterbi)."""
     best = network.log_start + log_likelihood[0]
-    before = np.empty((len(log_likelihood), len(best)), np.int64)
+    before = np.empty((len(log_likelihood), len(best)), np.min_scalar_type(len(best)))
     columns = np.arange(len(best))
     for t in range(1, len(log_likelihood)):
         arrive = best[:, None] + network.log_step
@@ -113,6 +116,8 @@ class HeadHmm:
 
     def clusters(self, audio: NDArray[np.float32], count: int) -> Ints:
         """[T] the cluster that the head is in, at `count` moments of sound [S] at RATE."""
-        prosody = prosody_of(self.windows.cut(audio, 0, 0, count).astype(np.float64), HEARD_FPS)
+        bounds = pairwise([*range(0, count, MOST_WINDOWS), count])
+        pieces = (self.windows.cut(audio, 0, first, stop).astype(np.float64) for first, stop in bounds)
+        prosody = prosody_of(pieces, HEARD_FPS)
         (log_likelihood,) = self.log_likelihood(prosody=prosody.astype(np.float32)[None])
         return self.network.clusters[most_likely(self.network, log_likelihood[0].astype(np.float64))[1]]

@@ -1,5 +1,7 @@
 """What of a voice the head follows: pitch, formants, cepstra and predictors, or prosody alone (Deng 2006, §4.3, §4.4)."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,17 +55,13 @@ def voice_features(windows: Floats, pitch_before_hz: float) -> tuple[Floats, flo
     return features, float(pitch_hz[-1]) if len(pitch_hz) else pitch_before_hz
 
 
-def prosody_of(windows: Floats, fps: float) -> Floats:
-    """[T, 6] pitch and energy with first and second differences, of windows [T, PITCH_WINDOW] of a whole utterance.
+def prosody_of(pieces: Iterable[Floats], fps: float) -> Floats:
+    """[T, 6] pitch and energy with first and second differences, of windows [T, PITCH_WINDOW] of a whole utterance, in pieces.
 
     Pitch is a logarithm, bridged by cubics where nothing is voiced, and counts from the speaker's own median; energy is the
     RMS of 25 ms in dB below the loudest tenth. Both in their own standard deviations: no model knows the speaker's level.
     """
-    windows = without_rumble(windows)
-    octaves, voiced = _heard_pitch(windows)
-    length = round(PROSODY_WINDOW_S * RATE)
-    middle = (PITCH_WINDOW - length) // 2
-    rms = np.sqrt(np.square(windows[:, middle : middle + length]).mean(axis=1))
+    octaves, voiced, rms = (np.concatenate(part) for part in zip(*map(_pitch_and_rms, pieces), strict=True))
     energy = 20 * np.log10(np.maximum(rms / max(np.percentile(rms, 90), 1e-9), 10 ** (QUIET_DB / 20)))
     voiced &= energy > FAINT_DB
     voiced &= np.abs(octaves - np.median(octaves[voiced] if voiced.any() else octaves)) < SLIP_OCTAVES
@@ -72,6 +70,13 @@ def prosody_of(windows: Floats, fps: float) -> Floats:
     slopes = np.gradient(tracks, axis=0) * fps if len(tracks) > 1 else np.zeros_like(tracks)
     bends = np.gradient(slopes, axis=0) * fps if len(tracks) > 1 else np.zeros_like(tracks)
     return np.concatenate([tracks, slopes, bends], axis=1)
+
+
+def _pitch_and_rms(windows: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    windows = without_rumble(windows)
+    length = round(PROSODY_WINDOW_S * RATE)
+    middle = (PITCH_WINDOW - length) // 2
+    return *_heard_pitch(windows), np.sqrt(np.square(windows[:, middle : middle + length]).mean(axis=1))
 
 
 def without_rumble(windows: Floats) -> Floats:

@@ -95,7 +95,7 @@ class HeadHmmMethod(Method):
         recordings = with_head(corpus)
         angles = [angles_at(u, HEARD_FPS) for u in recordings]
         angles = about_mean(angles) if self.config["centred"] else angles
-        prosody = [prosody_of(sound_windows(u, HEARD_FPS, len(a)), HEARD_FPS) for u, a in zip(recordings, angles, strict=True)]
+        prosody = [prosody_of([sound_windows(u, HEARD_FPS, len(a))], HEARD_FPS) for u, a in zip(recordings, angles, strict=True)]
         scale = np.maximum(np.concatenate(prosody).std(axis=0), 1e-6)
         cells = codebook(np.concatenate(angles), self.config["clusters"])
         least = 1 if self.config["ergodic"] else self.config["states"]
