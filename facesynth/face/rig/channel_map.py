@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,13 +134,13 @@ def arkit_name(name: str) -> str | None:
 
 
 def folded_names(name: str) -> Iterator[str]:
-    """What a name may say, small letters and digits alone, the whole first: without Blender's `.001`, without what mesh or
-    exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), `_L`, `.R` or `L` as left and right.
+    """What a name may say, small letters and digits (of any script, all of one width) alone, the whole first: without
+    Blender's `.001`, without what mesh or exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), `_L`, `.R` or `L` as left and right.
     """
-    text = re.sub(r"\.\d{3}$", "", name.strip())
+    text = re.sub(r"\.\d{3}$", "", normalize("NFKC", name).strip())
     text = re.sub(r"(?:[_ .-]([LRlr])|(?<=[a-z])([LR]))$", lambda side: _SIDES[(side[1] or side[2]).lower()], text)
     starts = [0, *(match.end() for match in re.finditer(r"__|[_:|./ -]", text))]
-    yield from dict.fromkeys(plain for start in starts if (plain := re.sub(r"[^a-z0-9]", "", text[start:].lower())))
+    yield from dict.fromkeys(plain for start in starts if (plain := re.sub(r"[\W_]", "", text[start:].lower())))
 
 
 def _by_name(name: str) -> Channel:

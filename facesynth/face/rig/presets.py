@@ -8,7 +8,7 @@ from pathlib import Path
 from facesynth.face.rig.channel_map import Channel, arkit_name, folded_names
 from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
 
-PRESETS = ("cc4", "facs", "metahuman", "vrm1", "vrm0", "readyplayerme", "oculus")
+PRESETS = ("cc4", "facs", "metahuman", "vrm1", "vrm0", "readyplayerme", "oculus", "mmd")
 """Where two fit as well, the first is taken."""
 ENOUGH = 15
 """A head with so many of ARKit's names is driven by those; visemes that it has beside them would move the mouth twice."""
