@@ -32,9 +32,10 @@ class Verdict:
 def verdicts(result: Evaluation) -> list[Verdict]:
     """A sentence or two on each method; nothing where there is no mean face to compare with."""
     labels = [row.label for row in result.comparison.rows if row.label not in (SECOND_TAKE, MEAN_FACE)]
-    if MEAN_FACE not in result.comparison.scores:
+    scores = result.comparison.scores
+    if MEAN_FACE not in scores:
         return []
-    return [_verdict(result, label) for label in labels]
+    return [_verdict(result, label) for label in labels if any(scores[label][figure].utterances for figure in FIGURES)]
 
 
 def _verdict(result: Evaluation, label: str) -> Verdict:

@@ -8,10 +8,11 @@ from living_eyes import recording
 from nodding import nodding_corpus
 
 from facesynth.evaluation.compare import evaluate
-from facesynth.evaluation.contestants import contestant, references
+from facesynth.evaluation.contestants import Contestant, contestant, references
 from facesynth.evaluation.folds import make_folds
 from facesynth.evaluation.part_statistics import EYES, HEAD, PartSums
 from facesynth.evaluation.report import Wish, write_report
+from facesynth.evaluation.verdict import verdicts
 
 
 def test_what_moves_as_recorded_is_nought_apart_and_what_rests_is_one(tmp_path):
@@ -36,7 +37,7 @@ def test_what_moves_as_recorded_is_nought_apart_and_what_rests_is_one(tmp_path):
 def compared(tmp_path_factory):
     folder = tmp_path_factory.mktemp("heads")
     corpus = nodding_corpus(folder / "c", 6)
-    rows = [contestant("head_ridge"), contestant("head_rest"), contestant("mean_face")]
+    rows = [contestant("head_ridge"), contestant("head_rest"), Contestant("mean face", "mean_face")]
     return corpus, evaluate(rows, corpus, make_folds(corpus, 2), folder / "report"), folder / "report"
 
 
@@ -48,8 +49,9 @@ def test_heads_are_judged_as_heads_and_mouths_as_mouths(compared):
     assert scores["head_ridge"]["head_speed"].mean < 1.0
     assert not scores["head_ridge"]["marker_error"].utterances
     assert rows["head_ridge"].reasons["marker_error"] == "the method moves the head alone"
-    assert scores["mean_face"]["marker_error"].utterances == 6
-    assert not scores["mean_face"]["head_speed"].utterances
+    assert scores["mean face"]["marker_error"].utterances == 6
+    assert verdicts(result) == []
+    assert not scores["mean face"]["head_speed"].utterances
     assert {"head_cca", "head_speed", "head_spectrum", "marker_error"} <= set(result.main_columns())
 
 
