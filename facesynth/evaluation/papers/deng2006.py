@@ -6,17 +6,17 @@ from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import SPEECH
-from facesynth.evaluation.papers.deng2008 import database, spoken, times, trajectories
+from facesynth.evaluation.papers.deng2008 import database, published, spoken, times, trajectories
 from facesynth.evaluation.papers.drawing import variance_figure
 from facesynth.evaluation.papers.figure import Figure
-from facesynth.evaluation.papers.finding import Finding, not_implemented, values
+from facesynth.evaluation.papers.finding import Finding, values
+from facesynth.evaluation.papers.phone_maps import maps
 from facesynth.evaluation.regions import lip_points
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pca import Pca
 
 PHONES = (14, 24, 33, 63)
 SECONDS = (137.67, 192.86, 371.50, 518.34)
-MAPS = not_implemented("figs 5.22 to 5.26", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps")
 
 
 def mouth(material: Material) -> list[Finding]:
@@ -40,7 +40,12 @@ FIGURES: tuple[Figure, ...] = (
     Figure("§5.2", "variance of the mouth's markers in 5 dimensions", "97.5 %", mouth),
     *SPEECH,
     Figure("§5.3", "variance in 25 dimensions; motion nodes", "98.53 %; 5556", lambda material: database(material, "§5.3")),
-    Figure("figs 5.22 to 5.26", MAPS.what, MAPS.paper, lambda _: [MAPS]),
+    Figure(
+        "figs 5.22 to 5.26",
+        "phoneme Isomap maps beside PCA maps",
+        "pictures",
+        lambda material: maps(published(material), material, "figs 5.22 to 5.26"),
+    ),
     Figure(
         "table 5.2",
         "seconds of synthesis",

@@ -13,8 +13,9 @@ from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.drawing import lines_figure, variance_figure
 from facesynth.evaluation.papers.figure import Figure, absent
-from facesynth.evaluation.papers.finding import Finding, not_available, not_implemented, values
+from facesynth.evaluation.papers.finding import Finding, not_available, values
 from facesynth.evaluation.papers.joined import joined
+from facesynth.evaluation.papers.phone_maps import maps
 from facesynth.evaluation.trajectories import shown_channels, trajectory_figure
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
@@ -30,7 +31,6 @@ SECONDS_GPU = (50.828, 90.891, 232.078, 256.484)
 
 
 NAME = "eFASE"
-MAPS = not_implemented("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", "this version has no such maps")
 EMOTIONS = ("neutral", "angry", "sad")
 """Of figure 10."""
 
@@ -151,7 +151,12 @@ def _correlation(truth: np.ndarray, made: np.ndarray) -> float:
 
 FIGURES: tuple[Figure, ...] = (
     Figure("§3", "variance in 25 dimensions; motion nodes", "98.53 %; 5556", lambda material: database(material, "§3")),
-    Figure("figs 5 to 9", "phoneme Isomap maps beside PCA maps", "pictures", lambda _: [MAPS]),
+    Figure(
+        "figs 5 to 9",
+        "phoneme Isomap maps beside PCA maps",
+        "pictures",
+        lambda material: maps(published(material), material, "figs 5 to 9"),
+    ),
     Figure("fig. 10", "error per frame (eq. 13)", "curves for three sentences", errors),
     absent("fig. 12", "mesh distances", "a picture", "no number is given; see `facesynth.face.deform.mesh_distance`"),
     Figure(
