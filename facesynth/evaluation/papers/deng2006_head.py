@@ -64,7 +64,7 @@ def neighbours(material: Material) -> list[Finding]:
     best = NEIGHBOURS[int(np.argmin(errors))]
     curve = ", ".join(f"{k}: {error:.2f}" for k, error in zip(NEIGHBOURS, errors, strict=True))
     ours = f"least at {best} ({curve})"
-    picture = lines_figure({"": (NEIGHBOURS, errors)}, "neighbours K", "error (squared standard deviations)", yscale="log")
+    picture = lines_figure({"": (NEIGHBOURS, errors)}, "neighbours K", "error (squared standard deviations)")
     seven = found[7].weights[[2, 0, 1]]
     return [
         Finding("§4.1", "31 features in 4 dimensions", "98.89 %", f"{model.facts['variance_share']:.2%}", False, material.unlike),
