@@ -121,3 +121,24 @@ def textured(kind):
 def outside(document, _data):
     """A second mesh that no scene shows."""
     document.nodes.append(gl.Node(name="spare", mesh=1, translation=[90.0, 0.0, 0.0]))
+
+
+def teeth_on_a_jaw(document, data):
+    """Teeth without shapes, in a node under a jaw's joint at the ears."""
+    side = np.array([[-2, 0, 0], [2, 0, 0], [0, 0, 2]], "<f4")
+    data.extend(b"\0" * (-len(data) % 4))
+    start = len(data)
+    data.extend(side.tobytes())
+    document.bufferViews.append(gl.BufferView(buffer=0, byteOffset=start, byteLength=side.nbytes))
+    document.accessors.append(gl.Accessor(bufferView=len(document.bufferViews) - 1, componentType=gl.FLOAT, count=3, type="VEC3"))
+    document.accessors[-1].min, document.accessors[-1].max = side.min(axis=0).tolist(), side.max(axis=0).tolist()
+    position = len(document.accessors) - 1
+    corners = laid(document, data, np.array([0, 1, 2], "<u2"))
+    primitive = gl.Primitive(attributes=gl.Attributes(POSITION=position), indices=corners)
+    document.meshes.append(gl.Mesh(primitives=[primitive]))
+    first = len(document.nodes)
+    document.nodes[1].children.append(first)
+    document.nodes += [
+        gl.Node(name="CC_Base_JawRoot", translation=[0.0, -1.0, -6.0], children=[first + 1]),
+        gl.Node(name="Teeth", mesh=len(document.meshes) - 1, translation=[0.0, -3.0, 9.0]),
+    ]

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pygltflib as gl
 import pytest
 from bringing import lay_down, run
 from grids import PHONES, long_grid, put
@@ -15,6 +16,7 @@ from heads import (
     names_in_primitive,
     names_in_targets,
     outside,
+    teeth_on_a_jaw,
     textured,
     vrm0,
     vrm1,
@@ -104,6 +106,46 @@ def test_names_twice_move_the_first_and_are_told(tmp_path, said):
     assert channels["jawOpen"].max() > 0.5
     assert channels["jawOpen (2)"].max() == 0
     assert any("several shapes are called jawOpen" in line for line in told)
+
+
+JAW_MAPPING = """
+channels:
+  jawOpen: jawOpen
+  CC_Base_JawRoot: {from: jawOpen, turn: [20, 0, 0]}
+"""
+
+
+def test_teeth_on_a_jaw_are_told_and_a_mapping_turns_the_joint(tmp_path, said):
+    path = head(tmp_path / "teeth.glb", teeth_on_a_jaw)
+    assert any("Teeth hang on the joint CC_Base_JawRoot, which no channel turns" in line for line in said(path)[1])
+    path.with_suffix(".yaml").write_text(JAW_MAPPING, encoding="utf-8")
+    channels, told = said(path)
+    assert not any("hang on the joint" in line for line in told)
+    np.testing.assert_allclose(channels["CC_Base_JawRoot"], channels["jawOpen"], atol=1e-6)
+    own = load_own_head(path)
+    values = np.array([float(name == "CC_Base_JawRoot") for name in own.names])
+    moved = own.posed(values)[-3:] - own.rest_mm[-3:]
+    assert (moved[:, 1] < -20).all(), "teeth go down"
+    out, _ = said(path, output="out.glb")
+    document = gl.GLTF2().load(str(out))
+    turned = {document.nodes[channel.target.node].name for channel in document.animations[-1].channels}
+    assert "CC_Base_JawRoot" in turned
+    again = load_own_head(out, path.with_suffix(".yaml"))
+    np.testing.assert_allclose(again.rest_mm, own.rest_mm, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("joint", "said_of_it"),
+    [("{from: jawOpen, turn: 20}", "turn is degrees"), ("{from: jawOpen, turn: [1, 2, x]}", "must be a number")],
+)
+def test_joints_that_cannot_be_turned_are_told(tmp_path, joint, said_of_it):
+    path = head(tmp_path / "teeth.glb", teeth_on_a_jaw)
+    path.with_suffix(".yaml").write_text(f"channels:\n  CC_Base_JawRoot: {joint}\n", encoding="utf-8")
+    with pytest.raises(FacesynthError, match=said_of_it):
+        load_own_head(path)
+    path.with_suffix(".yaml").write_text(JAW_MAPPING.replace("JawRoot", "Jaws"), encoding="utf-8")
+    with pytest.raises(FacesynthError, match="CC_Base_JawRoot"):
+        load_own_head(path)
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ class Channel:
     high: float = 1.0
     mute: bool = False
     """The channel stays at 0."""
+    turn_deg: tuple[float, float, float] | None = None
+    """The channel is a joint that turns so far at 1, about the axes to the head's left, up and out of the face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +136,10 @@ def arkit_name(name: str) -> str | None:
 
 
 def folded_names(name: str) -> Iterator[str]:
-    """What a name may say, small letters and digits (of any script, all of one width) alone, the whole first: without
-    Blender's `.001`, without what mesh or exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), `_L`, `.R` or `L` as left and right.
+    """What a name may say, small letters and digits (of any script, of one width) alone, the whole first.
+
+    Without Blender's `.001`, without what mesh or exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), and `_L`,
+    `.R` or `L` as left and right.
     """
     text = re.sub(r"\.\d{3}$", "", normalize("NFKC", name).strip())
     text = re.sub(r"(?:[_ .-]([LRlr])|(?<=[a-z])([LR]))$", lambda side: _SIDES[(side[1] or side[2]).lower()], text)

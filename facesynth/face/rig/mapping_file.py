@@ -11,7 +11,7 @@ from facesynth.face.rig.channel_map import Channel, arkit_name
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
-FIELDS = ("from", "gain", "offset", "limit", "mute")
+FIELDS = ("from", "gain", "offset", "limit", "mute", "turn")
 SECTIONS = ("channels", "head", "mm_per_unit")
 
 
@@ -29,7 +29,8 @@ class HeadMapping:
 def read_mapping(path: str | Path) -> HeadMapping:
     """Read a mapping file (YAML): own channels under `channels`, and if need be `head` and `mm_per_unit`.
 
-    A channel is an ARKit name, or `{from: NAME or {NAME: share, …}, gain, offset, limit: [low, high], mute}`.
+    A channel is an ARKit name, or `{from: NAME or {NAME: share, …}, gain, offset, limit: [low, high], mute}`;
+    with `turn: [x, y, z]` it is a joint, which turns by so many degrees about the head's axes at 1.
     """
     import yaml
 
@@ -77,7 +78,17 @@ def _channel(name: str, value: Any, path: Path) -> Channel:
         low,
         high,
         bool(value.get("mute", False)),
+        _turn(value.get("turn"), where),
     )
+
+
+def _turn(value: Any, where: str) -> tuple[float, float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 3:
+        raise FacesynthError(f"{where}: turn is degrees about the axes [left, up, out of the face]; got {value!r}")
+    left, up, out = (_number(angle, f"{where}, turn") for angle in value)
+    return left, up, out
 
 
 def _arkit(name: str) -> str:

@@ -1,7 +1,7 @@
 """A head of somebody's own: triangles with morph targets under its own names, read from glTF or from OBJ files."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,8 +25,25 @@ LIKELY_FACE_MM = (70.0, 320.0)
 M_PER_UNIT_MM = 1000.0
 MOVED_SHARE = 0.05
 """A vertex belongs to the face if a shape moves it by this share of the largest movement."""
+USUAL_JAW_DEG = 20
+"""A jaw that is open as far as it goes."""
+_JAW = re.compile(r"jaw", re.IGNORECASE)
 _EYE = re.compile(r"eye(?!.*(lash|brow|lid|socket|occl|wet|shadow|tear|blink|liner))", re.IGNORECASE)
 SUFFIXES = (".glb", ".gltf", ".vrm")
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A node of a head that a channel turns, with all that hangs on it."""
+
+    channel: int
+    node: int
+    pivot_mm: NDArray[np.float64]
+    """[3]"""
+    turn: NDArray[np.float64]
+    """[3] rotation vector at value 1, rad."""
+    weight: NDArray[np.float32]
+    """[V] share of its motion that a vertex follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +77,8 @@ class OwnHead:
     """The node of a glTF file that turns with the head."""
     eye_nodes: tuple[int, ...] = ()
     """The node of each of `eyes`."""
+    joints: tuple[Joint, ...] = ()
+    """What channels turn, in place of moving it by a shape."""
     remarks: tuple[str, ...] = ()
     """What was assumed of the head, for a person."""
 
@@ -77,6 +96,10 @@ class OwnHead:
         amounts = np.asarray(values, np.float32)
         active = np.flatnonzero(amounts)
         vertices = self.rest_mm + np.tensordot(amounts[active], self.shapes_mm[active], 1)
+        for joint in self.joints:
+            turn = Rotation.from_rotvec(joint.turn * float(amounts[joint.channel]))
+            moved = turn.apply(vertices - joint.pivot_mm) + joint.pivot_mm
+            vertices = vertices + joint.weight[:, None] * (moved - vertices)
         if gaze is not None:
             left, up = np.asarray(gaze, np.float64)
             turn = Rotation.from_euler("YX", [left, -up])
@@ -119,6 +142,8 @@ def _mapping(found: Path | None, names: Sequence[str]) -> tuple[HeadMapping, tup
 def _from_scene(path: Path, scene: Scene, found: Path | None, needs_arkit: bool) -> OwnHead:
     names = tuple(dict.fromkeys(name for part in scene.parts for name in part.targets))
     told, assumed = _mapping(found, names)
+    turned = [name for name, channel in told.channels.items() if channel.turn_deg is not None]
+    names += tuple(name for name in turned if name not in names)
     vertices = np.concatenate([part.vertices for part in scene.parts])
     starts = np.cumsum([0, *(len(part.vertices) for part in scene.parts)])
     shapes = np.zeros((len(names), len(vertices), 3), np.float32)
@@ -141,7 +166,35 @@ def _from_scene(path: Path, scene: Scene, found: Path | None, needs_arkit: bool)
     eye_nodes = tuple(number for _, number in balls)
     arrays = (vertices, shapes, triangles, colours, weight)
     placed = _placed(path, arrays, channel_map, told, M_PER_UNIT_MM, pivot, [ball for ball, _ in balls], node, eye_nodes)
-    return replace(placed, remarks=(*assumed, *scene.remarks))
+    joints = tuple(_joint(placed, scene, name) for name in turned)
+    return replace(placed, joints=joints, remarks=(*assumed, *scene.remarks, *_hanging(scene, joints)))
+
+
+def _joint(head: OwnHead, scene: Scene, name: str) -> Joint:
+    """The joint of a channel that turns the node of this name."""
+    if name not in scene.names:
+        raise unknown("node that a mapping turns", name, [known for known in scene.names if known])
+    node, channel = scene.names.index(name), head.names.index(name)
+    weight = np.concatenate([part.follows[:, scene.below(node)].sum(axis=1) for part in scene.parts])
+    pivot_mm = (scene.places[node, :3, 3] - head.middle) * head.mm_per_unit
+    turn = np.deg2rad(head.map.channels[channel].turn_deg or (0.0, 0.0, 0.0))
+    return Joint(channel, node, pivot_mm, turn, np.clip(weight, 0, 1).astype(np.float32))
+
+
+def _hanging(scene: Scene, joints: Sequence[Joint]) -> Iterator[str]:
+    """A line where teeth or tongue have no shapes and hang on a jaw that nothing turns."""
+    turned = {int(node) for joint in joints for node in scene.below(joint.node)}
+    for jaw in (i for i, name in enumerate(scene.names) if _JAW.search(name) and i not in turned):
+        below = scene.below(jaw)
+        parts = [part for part in scene.parts if not part.targets and part.follows[:, below].sum(axis=1).mean() > 0.5]
+        if parts:
+            what = ", ".join(dict.fromkeys(scene.names[part.node] or part.name for part in parts))
+            name = scene.names[jaw]
+            yield (
+                f"{what} hang on the joint {name}, which no channel turns: they stay shut while the mouth opens; in a mapping"
+                f" `{name}: {{from: jawOpen, turn: [{USUAL_JAW_DEG}, 0, 0]}}` turns it"
+            )
+            return
 
 
 def _from_obj(folder: Path, found: Path | None, needs_arkit: bool) -> OwnHead:

@@ -40,6 +40,7 @@ def animated_document(animation: FaceAnimation, head: OwnHead) -> tuple[gl.GLTF2
             node.weights = None
     scene = read_scene(head.source, _NO_TEXELS)
     tracks += _head_tracks(document, animation, head, scene) + _eye_tracks(document, animation, head, scene)
+    tracks += _joint_tracks(document, animation, head, scene)
     document.animations = [*(document.animations or []), speech_animation(buffer, animation, tracks)]
     return document, buffer
 
@@ -83,6 +84,17 @@ def _eye_tracks(document: gl.GLTF2, animation: FaceAnimation, head: OwnHead, sce
         origin = centre + look.apply(scene.places[eye][:3, 3] - centre)
         tracks.append(rotation_track(eye, _within(parent, look) * Rotation.from_quat(rest.rotation)))
         tracks.append(translation_track(eye, (origin - parent[:3, 3]) @ np.linalg.inv(parent[:3, :3]).T))
+    return tracks
+
+
+def _joint_tracks(document: gl.GLTF2, animation: FaceAnimation, head: OwnHead, scene: Scene) -> list[Track]:
+    """Rotation of each node that a channel turns."""
+    tracks = []
+    for joint in head.joints:
+        amounts = animation.weights_for([head.names[joint.channel]]).astype(np.float64)
+        rest = _as_trs(document.nodes[joint.node])
+        turn = _within(_parent_place(scene, joint.node), Rotation.from_rotvec(amounts * joint.turn))
+        tracks.append(rotation_track(joint.node, turn * Rotation.from_quat(rest.rotation)))
     return tracks
 
 
