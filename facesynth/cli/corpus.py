@@ -97,6 +97,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--text-file", type=FILE, help="The same, from a file; or for many, CSV with the columns id and text.")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
 @click.option("--speaker", help="Whose phones are taken, where TextGrids hold those of several.")
+@click.option("--language", help="Of the texts, such as de or pt (ISO 639-1); found out otherwise.")
 @click.option("--emotion", help="Emotion of every recording added; neutral if nothing says otherwise.")
 @click.option("--emotions", type=FILE, help="Emotion that moves over time, for one recording: CSV, or lines of `end emotion`.")
 @click.option("--intensity", type=click.FloatRange(0, 1), help="Intensity of the emotion; 1 otherwise.")
@@ -129,6 +130,7 @@ def add(
     text_file: Path | None,
     phones: Path | None,
     speaker: str | None,
+    language: str | None,
     emotions: Path | None,
     utterance_id: str | None,
     list_file: Path | None,
@@ -174,6 +176,7 @@ def add(
             texts=texts,
             phones=phones,
             speaker=speaker,
+            language=language,
             emotions=emotions,
             face=face,
             replacing=replacing,

@@ -38,6 +38,7 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--text-file", type=FILE, help="The same, from a file.")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`.")
 @click.option("--speaker", help="Whose phones are taken, where a TextGrid holds those of several.")
+@click.option("--language", help="Of the text, such as de or pt (ISO 639-1); found out otherwise.")
 @click.option("--emotion", help="One emotion for everything; `auto`: the one heard in the voice.")
 @click.option("--emotions", type=FILE, help="Emotion over time: CSV, or lines of `end emotion`; `auto`: as heard in the voice.")
 @click.option(

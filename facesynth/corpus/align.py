@@ -17,7 +17,7 @@ from facesynth.speech.audio import load_audio
 from facesynth.speech.textgrid import write_textgrid
 
 if TYPE_CHECKING:
-    from facesynth.speech.alignment import Alignment
+    from facesynth.speech.phone_sources import FoundPhones
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def align(corpus: Corpus, ids: Iterable[str] | None = None, force: bool = False,
             continue
         _keep(corpus, record, placed)
         aligned.append(record.id)
-        warnings.update({record.id: tuple(placed.warnings)} if placed.warnings else {})
+        warnings.update({record.id: placed.remarks} if placed.remarks else {})
     return AlignReport(tuple(aligned), {name: reason for name, reason in reasons.items() if reason}, failed, warnings)
 
 
@@ -68,16 +68,16 @@ def _reason_to_keep(corpus: Corpus, record: Record, force: bool) -> str:
     return ""
 
 
-def _attempt(files: Files, record: Record) -> Alignment | FacesynthError:
-    from facesynth.speech.alignment import align as place
+def _attempt(files: Files, record: Record) -> FoundPhones | FacesynthError:
+    from facesynth.speech.phone_sources import find_phones
 
     try:
-        return place(*load_audio(files.audio(record.id)), record.text)
+        return find_phones(*load_audio(files.audio(record.id)), text=record.text)
     except FacesynthError as error:
         return error
 
 
-def _keep(corpus: Corpus, record: Record, placed: Alignment) -> None:
+def _keep(corpus: Corpus, record: Record, placed: FoundPhones) -> None:
     """The TextGrid first, then its hash: interrupted between, the file counts as corrected by hand, which is safe."""
     path = corpus.files.phones(record.id)
     write_textgrid(path, placed.phones, placed.words)

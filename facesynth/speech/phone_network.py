@@ -22,6 +22,8 @@ HOP, WINDOW = STEP // 2, 400
 BLOCKS, WIDTH, HEADS, KERNEL = 4, 144, 4, 31
 BANDS = 80
 SMALLEST_POWER = 1e-10
+GLIDES = "jw"
+"""What begins a token for two sounds."""
 
 
 class FeedForward(nn.Module):
@@ -147,9 +149,11 @@ def phone_hearing() -> PhoneHearing:
 
 
 def _phones_of(token: str) -> tuple[str, ...]:
-    """As one label, else letter by letter (`ja`)."""
+    """As one label; a glide and a vowel (`ja`) letter by letter, and so what is no label."""
     if token.startswith("<") or not token.strip():
         return ()
+    if len(token) == 2 and token[0] in GLIDES:
+        return tuple(phone for letter in token for phone in _phones_of(letter))
     try:
         return tuple(phone for phone in (normalise_phone(token, "ipa"),) if phone != SILENCE)
     except FacesynthError:

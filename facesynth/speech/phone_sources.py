@@ -1,5 +1,6 @@
 """The one way to phones: from a sound and what is known of it to a track with times, confidences and remarks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,13 +11,14 @@ from numpy.typing import NDArray
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import align
+from facesynth.speech.languages import ENGLISH, code_of, language_of, pronounced
 from facesynth.speech.phone_archive import DISTRIBUTION, is_installed
+from facesynth.speech.pronunciation import pronounce
 from facesynth.speech.segments import Segment, covering
 from facesynth.speech.textgrid import SAME_LENGTH_S, is_textgrid, read_labelled
+from facesynth.speech.transcript import words_of
 
 Source = Literal["textgrid", "labels", "transcript", "recognition"]
-
-ENGLISH = "en"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,20 +46,63 @@ def find_phones(
     """Phones of a sound [S], -1..1, at `rate` Hz: those that are given, else aligned with the words, else heard.
 
     given: a TextGrid, of which the phones of `speaker` are taken where it holds several, or lines of `end label`; text: what
-    is said; language: of the text, English where nobody says. What is heard may be in any language. FacesynthError where none
-    of it can be used.
+    is said; language: of the text (ISO 639-1), found out where nobody says. What is heard without a text may be in any language.
+    FacesynthError where none of it can be used.
     """
     if given is not None:
         return _read(given, len(audio) / rate, speaker)
     if text is None:
         return _heard(audio, rate)
-    if language not in (None, ENGLISH):
-        raise FacesynthError(
-            f"texts in the language {language!r} cannot be pronounced here, {ENGLISH!r} alone can;"
-            " leave the text out to have the phones heard, or give the phones"
-        )
-    found = align(audio, rate, text)
-    return FoundPhones(found.phones, found.words, found.warnings, "transcript")
+    spoken = code_of(language) if language is not None else language_of(text)
+    return _in_english(audio, rate, text) if spoken == ENGLISH else _in_another(audio, rate, text, spoken, given=language)
+
+
+def _in_english(audio: NDArray[np.float32], rate: int, text: str) -> FoundPhones:
+    """By pocketsphinx; where it cannot follow the words, by the phone network, which also tells the words that do not fit."""
+    try:
+        found = align(audio, rate, text)
+    except FacesynthError:
+        instead = _followed_by_network(audio, rate, text)
+        if instead is None:
+            raise
+        return instead
+    return FoundPhones(found.phones, found.words, (*found.warnings, *_cross_check(audio, rate, found.words)), "transcript")
+
+
+def _followed_by_network(audio: NDArray[np.float32], rate: int, text: str) -> FoundPhones | None:
+    words = tuple((word, pronounce(word)) for word in words_of(text)) if is_installed() else ()
+    if not words:
+        return None
+    from facesynth.speech.text_alignment import align_words, doubts
+
+    try:
+        found = align_words(audio, rate, words)
+    except FacesynthError:
+        return None
+    remark = "the aligner of English could not follow the words; the network that hears phones placed them"
+    return FoundPhones(found.phones, found.words, (remark, *doubts(found.doubtful)), "transcript")
+
+
+def _in_another(audio: NDArray[np.float32], rate: int, text: str, code: str, given: str | None) -> FoundPhones:
+    words = pronounced(text, code)
+    if not is_installed():
+        raise FacesynthError(f"texts in {code!r} are aligned by the phone network, which is missing: pip install {DISTRIBUTION}")
+    from facesynth.speech.text_alignment import align_words, doubts
+
+    found = align_words(audio, rate, words)
+    remarks = () if given else (f"the transcript is taken to be in the language {code!r}; --language says otherwise",)
+    return FoundPhones(found.phones, found.words, (*remarks, *doubts(found.doubtful)), "transcript")
+
+
+def _cross_check(audio: NDArray[np.float32], rate: int, words: Sequence[Segment]) -> tuple[str, ...]:
+    """A remark on words of a transcript that the phone network does not hear where they were found."""
+    if not is_installed():
+        return ()
+    from facesynth.speech.text_alignment import doubtful, doubts, heard_classes, told
+
+    pronunciations = [(word, pronounce(word)) for word, _, _ in words]
+    spikes = told(heard_classes(audio, rate), [phones for _, phones in pronunciations])
+    return () if spikes is None else doubts([words[number] for number in doubtful(spikes, pronunciations)])
 
 
 def _heard(audio: NDArray[np.float32], rate: int) -> FoundPhones:

@@ -34,10 +34,15 @@ def recognise(audio: NDArray[np.float32], rate: int, *, fit: bool = True) -> Pho
     heard = phone_hearing().spikes(audio, rate)
     if not heard:
         raise no_speech()
+    return placed(audio, rate, heard, fit=fit)
+
+
+def placed(audio: NDArray[np.float32], rate: int, heard: Sequence[Spike], *, fit: bool = True) -> PhoneTrack:
+    """The track of spikes in order of time, as long as the sound [S] at `rate` Hz; `fit` as in `recognise`."""
     duration_s = len(audio) / rate
     around = segments_around(heard, duration_s)
-    placed = in_one(_fitted_pieces(audio, rate, heard, around)) if fit else around
-    return _with_confidences(phone_track(placed, duration_s), heard)
+    segments = in_one(_fitted_pieces(audio, rate, heard, around)) if fit else around
+    return _with_confidences(phone_track(segments, duration_s), heard)
 
 
 def _fitted_pieces(

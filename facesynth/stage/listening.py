@@ -60,7 +60,7 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         phones = grid if grid.exists() else None
         text = read_text(words) if phones is None and words.exists() else None
     if cast.detector is not None:
-        heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker)
+        heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker, language=request.language)
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
     emotion = request.emotion or (None if request.emotions else cast.emotions[0])
     heard = hear(
@@ -68,6 +68,7 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         text=text,
         phones_path=phones,
         speaker=request.speaker,
+        language=request.language,
         emotion=emotion,
         emotions_path=request.emotions,
         intensity=1.0 if isinstance(request.intensity, Path) else request.intensity,

@@ -71,6 +71,8 @@ class Request:
     """A TextGrid, or lines of `end label`."""
     speaker: str | None = None
     """Whose phones are taken, where a TextGrid holds those of several."""
+    language: str | None = None
+    """Of the text (ISO 639-1); found out otherwise."""
     emotion: str | None = None
     """One for everything, or AUTO."""
     emotions: str | Path | None = None

@@ -27,7 +27,7 @@ def aligner(monkeypatch):
         duration_s = len(audio) / rate
         return Placed(PhoneTrack(("pau", "aa", "pau"), np.array([0.1, duration_s - 0.1, duration_s])))
 
-    monkeypatch.setattr("facesynth.speech.alignment.align", place)
+    monkeypatch.setattr("facesynth.speech.phone_sources.align", place)
 
 
 @pytest.fixture

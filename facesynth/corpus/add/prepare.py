@@ -218,8 +218,14 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
     """The phones of what the corpus will hold, so that aligning it later gives the same."""
     from facesynth.speech.hearing import hear_sound
 
-    text = record.text or None
-    return hear_sound(take.stored, take.sample_rate, text=text, phones_path=recording.phones, speaker=recording.speaker)
+    return hear_sound(
+        take.stored,
+        take.sample_rate,
+        text=record.text or None,
+        language=recording.language,
+        phones_path=recording.phones,
+        speaker=recording.speaker,
+    )
 
 
 def _is_aligned(heard: Heard | None) -> bool:

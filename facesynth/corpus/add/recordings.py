@@ -46,6 +46,8 @@ class Recording:
     emotions: Path | None = None
     speaker: str | None = None
     """Whose phones are taken, where their file holds those of several."""
+    language: str | None = None
+    """Of the text (ISO 639-1); found out otherwise."""
 
 
 def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:
