@@ -30,7 +30,7 @@ from facesynth.corpus.utterance import Utterance
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.inference.phones import PHONES
+from facesynth.inference.phones import PHONES, SILENCE
 from facesynth.inference.speech import Speech
 from facesynth.motion.gaps import GapReport
 from facesynth.speech.segments import Segment
@@ -283,6 +283,18 @@ class Corpus:
 
     def remove_node(self, name: str) -> None:
         """Remove a node (`utterance_id:phone_number`, or an added one); the recording stays as it is."""
+        name = self.known_node(name)
+        with self._lock():
+            self.journal.remove(name)
+
+    def restore_node(self, name: str) -> None:
+        """Take back that a node was removed."""
+        name = self.known_node(name)
+        with self._lock():
+            self.journal.restore(name)
+
+    def known_node(self, name: str) -> str:
+        """The name of a node of this corpus, removed or not, as it is written; FacesynthError for any other."""
         utterance_id, number = parse_node(name)
         if utterance_id == ADDED:
             known = [node.name for node in self.added_nodes()]
@@ -292,19 +304,18 @@ class Corpus:
         name = node_name(utterance_id, number)
         if name not in known and name not in self.removed_nodes():
             raise unknown("node", name, known)
-        with self._lock():
-            self.journal.remove(name)
+        return name
 
-    def add_node(self, phone: str, emotion: str, frames: ArrayLike) -> AddedNode:
-        """Add a node: the motion [L, C] of one phone in one emotion."""
+    def add_node(self, phone: str, emotion: str, frames: ArrayLike, title: str = "") -> AddedNode:
+        """Add a node: the motion [L, C] of one phone in one emotion, at the corpus's rate."""
         motion = Motion(np.asarray(frames, np.float32), self.fps, self.layout)
         if not len(motion) or not np.isfinite(motion.frames).all():
             raise FacesynthError("an added node needs at least one frame and no missing samples")
-        if phone not in PHONES:
-            raise unknown("phone", phone, PHONES)
+        if phone not in PHONES or phone == SILENCE:
+            raise unknown("phone", phone, [known for known in PHONES if known != SILENCE])
         self._check_emotion(emotion)
         with self._lock():
-            return self.journal.add(phone, emotion, motion.frames)
+            return self.journal.add(phone, emotion, motion.frames, title)
 
     def undo(self) -> Edit:
         """Take back the newest edit of a node."""

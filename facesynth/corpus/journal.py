@@ -1,11 +1,11 @@
-"""edits.jsonl: nodes that a person removed, added or took back. It only grows; recordings are never touched.
+"""edits.jsonl: nodes that a person removed, restored, drew, or whose edit was taken back. It only grows; recordings stay.
 
 A node is one phone of one utterance, called `utterance_id:phone_number`, counted from 0 in the utterance's phone
-track. Added nodes are called `+:number`, which no utterance can be called.
+track. Drawn nodes are called `+:number` after the line that drew them; no utterance can be called so.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,19 @@ class AddedNode:
     phone: str
     emotion: str
     frames: NDArray[np.float32]
-    """[L, C] in the layout's unit."""
+    """[L, C] in the layout's unit, at the corpus's rate."""
+    title: str = ""
+    """What the person called it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edits:
+    """What a journal comes to."""
+
+    removed: frozenset[str]
+    """Names of nodes."""
+    added: tuple[AddedNode, ...]
+    """That were not removed again."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +48,7 @@ class Edit:
 
     number: int
     op: str
-    """remove, add or undo."""
+    """remove, restore, add or undo."""
     facts: Mapping[str, Any]
 
 
@@ -73,23 +85,34 @@ class Journal:
 
     def removed(self) -> frozenset[str]:
         """Names of removed nodes."""
-        return frozenset(edit.facts["node"] for edit in self.in_force if edit.op == "remove")
+        return _removed(self.in_force)
 
     def added(self) -> tuple[AddedNode, ...]:
         """Added nodes that were not removed again."""
-        removed = self.removed()
-        nodes = (_added(edit) for edit in self.in_force if edit.op == "add")
-        return tuple(node for node in nodes if node.name not in removed)
+        return self.sum().added
+
+    def sum(self) -> Edits:
+        """What all edits that are in force come to."""
+        edits = self.in_force
+        removed = _removed(edits)
+        nodes = (_added(edit) for edit in edits if edit.op == "add")
+        return Edits(removed, tuple(node for node in nodes if node.name not in removed))
 
     def remove(self, node: str) -> None:
         """Remove a node; removing it again changes nothing."""
         if node not in self.removed():
             self._append("remove", node=node)
 
-    def add(self, phone: str, emotion: str, frames: NDArray[np.float32]) -> AddedNode:
+    def restore(self, node: str) -> None:
+        """Take back the removal of a node; one that is not removed stays as it is."""
+        if node in self.removed():
+            self._append("restore", node=node)
+
+    def add(self, phone: str, emotion: str, frames: NDArray[np.float32], title: str = "") -> AddedNode:
         """Add a node with its motion [L, C]; values are kept to 0.0001 of the layout's unit."""
         rounded = np.round(np.asarray(frames, np.float64), 4).tolist()
-        return _added(self._append("add", phone=phone, emotion=emotion, frames=rounded))
+        named = {"title": title} if title else {}
+        return _added(self._append("add", phone=phone, emotion=emotion, **named, frames=rounded))
 
     def undo(self) -> Edit:
         """Take back the newest edit that is in force, and return it."""
@@ -117,6 +140,7 @@ class Journal:
 
 _FIELDS: Mapping[str, Mapping[str, Callable[[Any], bool]]] = {
     "remove": {"node": lambda value: isinstance(value, str)},
+    "restore": {"node": lambda value: isinstance(value, str)},
     "add": {
         "phone": lambda value: isinstance(value, str),
         "emotion": lambda value: isinstance(value, str),
@@ -135,9 +159,19 @@ def _edit(path: Path, number: int, line: str) -> Edit:
     wanted = _FIELDS.get(str(op))
     if wanted is None or not all(name in facts and fits(facts[name]) for name, fits in wanted.items()):
         raise FacesynthError(
-            f"{path}, line {number}: not an edit (remove with node, add with phone, emotion and frames, undo with of)"
+            f"{path}, line {number}: not an edit (remove or restore with node, add with phone, emotion and frames, undo with of)"
         )
     return Edit(number, str(op), facts)
+
+
+def _removed(edits: Iterable[Edit]) -> frozenset[str]:
+    removed: set[str] = set()
+    for edit in edits:
+        if edit.op == "remove":
+            removed.add(edit.facts["node"])
+        elif edit.op == "restore":
+            removed.discard(edit.facts["node"])
+    return frozenset(removed)
 
 
 def _added(edit: Edit) -> AddedNode:
@@ -146,4 +180,4 @@ def _added(edit: Edit) -> AddedNode:
         frames = np.array(edit.facts["frames"], np.float32)
     except (ValueError, TypeError):
         raise FacesynthError(f"added node {name}: its frames are not lists of numbers of equal length") from None
-    return AddedNode(name, edit.facts["phone"], edit.facts["emotion"], frames)
+    return AddedNode(name, edit.facts["phone"], edit.facts["emotion"], frames, str(edit.facts.get("title", "")))

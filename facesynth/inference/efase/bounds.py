@@ -56,7 +56,7 @@ def step_bounds(nodes: Nodes, weights: Weights) -> dict[str, NDArray[Any]]:
         table = np.full((len(own), len(j)), np.inf)
         by_length = np.argsort(nodes.lengths[nodes.before[j]], kind="stable")
         for some in np.split(by_length, range(COLUMNS, len(j), COLUMNS)) if len(j) else ():
-            cost = _steps(nodes, i, j[some], weights)
+            cost = steps_within(nodes, i, j[some], weights)
             table[:, some] = np.minimum.reduceat(cost, first[own] - i[0], axis=0)
             classes = of_class[j[some]]
             for number in np.unique(classes):
@@ -65,7 +65,7 @@ def step_bounds(nodes: Nodes, weights: Weights) -> dict[str, NDArray[Any]]:
     return dict(zip(TABLES, _coded(np.concatenate(coming), out), strict=True))
 
 
-def _steps(nodes: Nodes, i: Ints, j: Ints, weights: Weights) -> Floats:
+def steps_within(nodes: Nodes, i: Ints, j: Ints, weights: Weights) -> Floats:
     """[n, m] costs of steps within a viseme; infinite where they were captured."""
     terms = step_terms(nodes, i, j)
     return np.where(terms.captured > 0, np.inf, terms.cost(0.0, 0.0, weights.beta, weights.eta))
@@ -75,14 +75,15 @@ def _coded(coming: Floats, out: NDArray[np.float32]) -> tuple[NDArray[Any], NDAr
     known = np.concatenate([table[np.isfinite(table) & (table > 0)].ravel() for table in (coming, out)])
     lowest, highest = (float(known.min()), float(known.max())) if len(known) else (1.0, 1.0)
     ratio = max((highest / lowest) ** (1 / (NONE - 3)), 1 + 1e-6)
+    return coded(coming, lowest, ratio), coded(out, lowest, ratio), np.array([lowest, ratio])
 
-    def code(table: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        finite = np.isfinite(table)
-        with np.errstate(divide="ignore"):
-            steps = np.floor(np.log(np.where(finite, table, 1.0) * ROUNDING / lowest) / np.log(ratio))
-        return np.where(finite, np.clip(steps + 1, 0, NONE - 1), NONE).astype(np.uint8)
 
-    return code(coming), code(out), np.array([lowest, ratio])
+def coded(costs: NDArray[np.floating[Any]], lowest: float, ratio: float) -> NDArray[np.uint8]:
+    """Costs as they stand in a table, rounded down; infinite ones are NONE."""
+    finite = np.isfinite(costs)
+    with np.errstate(divide="ignore"):
+        steps = np.floor(np.log(np.where(finite, costs, 1.0) * ROUNDING / lowest) / np.log(ratio))
+    return np.where(finite, np.clip(steps + 1, 0, NONE - 1), NONE).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)

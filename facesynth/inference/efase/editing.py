@@ -66,10 +66,20 @@ class EfaseDraft:
                 ends_s[t],
                 feelings[t],
                 intensity[t],
-                *(_mark(plan, t, bounds) for plan in self.plans),
+                *(self._mark(plan, t, bounds) for plan in self.plans),
             )
             for t in range(len(labels))
         ]
+
+    def _mark(self, plan: Plan, t: int, bounds: Sequence[int]) -> Hashable:
+        names, mixture = self.model.names, plan.mixtures[t] if plan.mixtures is not None else None
+        if mixture is not None:
+            mixed = tuple(names[node] for node in mixture.nodes.tolist())
+            return (mixed, mixture.shares.round(SHARES).tobytes(), round(mixture.captured, SHARES))
+        if plan.nodes[t] < 0:
+            expected = plan.expected
+            return None if expected is None else expected[bounds[t] : bounds[t + 1]].round(SHARES).tobytes()
+        return names[plan.nodes[t]]
 
 
 class EfaseEditor:
@@ -77,18 +87,20 @@ class EfaseEditor:
 
     def __init__(self, model: Efase) -> None:
         self.model = _remembering(model)
-        self._last: EfaseDraft | None = None
 
     def change(
-        self, speech: Speech, *, seed: int = 0, constraints: Mapping[int, str] | None = None, **options: Any
+        self,
+        speech: Speech,
+        *,
+        seed: int = 0,
+        constraints: Mapping[int, str] | None = None,
+        after: EfaseDraft | None = None,
+        **options: Any,
     ) -> EfaseDraft:
-        """The draft of a speech; options as of `Efase.synthesize`, of which `fps` and `look_ahead` are none of an editor's."""
+        """The draft of a speech, beside the one before it; `fps` and `look_ahead` are no options of an editor's."""
         reject_options("efase", options, ("seed", "constraints"))
         draft = EfaseDraft(self.model, speech, self.model.plans(speech, constraints=constraints), (0.0, speech.duration_s))
-        if self._last is not None:
-            draft = replace(draft, changed_s=_changed_s(self._last, draft))
-        self._last = draft
-        return draft
+        return draft if after is None else replace(draft, changed_s=_changed_s(after, draft))
 
 
 class _Remembering(Efase):
@@ -109,15 +121,6 @@ def _remembering(model: Efase) -> Efase:
     hearing = None if parts.hearing is None else KeptHearing.of(parts.hearing)
     engine = parts.engine or KeptSearches(model.index)
     return _Remembering(replace(parts, hearing=hearing, engine=engine, step_matrix=KeptMatrices()))
-
-
-def _mark(plan: Plan, t: int, bounds: Sequence[int]) -> Hashable:
-    mixture = plan.mixtures[t] if plan.mixtures is not None else None
-    if mixture is not None:
-        return (mixture.nodes.tobytes(), mixture.shares.round(SHARES).tobytes(), round(mixture.captured, SHARES))
-    if plan.nodes[t] < 0 and plan.expected is not None:
-        return plan.expected[bounds[t] : bounds[t + 1]].round(SHARES).tobytes()
-    return int(plan.nodes[t])
 
 
 def _changed_s(before: EfaseDraft, after: EfaseDraft) -> tuple[float, float] | None:

@@ -1,9 +1,12 @@
 """What is learned of sound for the target cost: how the nodes sounded, and what pose a sound leads one to expect."""
 
 from collections.abc import Sequence
+from copy import copy
+from typing import Self
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, node_name
@@ -46,11 +49,18 @@ class PhoneSound(nn.Module):
         self.pca = Pca.fit(known, COMPONENTS)
         vectors = np.zeros((len(names), self.pca.basis.shape[1]), np.float32)
         vectors[recorded] = self.pca.encode(torch.from_numpy(known)).numpy()
-        for place in np.flatnonzero(~recorded):
-            alike = recorded & (phones == phones[place])
-            vectors[place] = vectors[alike].mean(axis=0) if alike.any() else 0.0
+        vectors = _with_means(vectors, recorded, phones)
         self.size = torch.from_numpy(vectors[recorded].std(axis=0).clip(1e-6) * np.sqrt(vectors.shape[1])).float()
         self.nodes = torch.from_numpy(vectors) / self.size
+
+    def of_nodes(self, kept: Ints, phones: Ints) -> Self:
+        """The same for the nodes `kept` [K] and others after them, which have no sound; phones [N] of all of them."""
+        other = copy(self)
+        other._buffers = dict(self._buffers)
+        vectors = np.zeros((len(phones), self.nodes.shape[1]), np.float32)
+        vectors[: len(kept)] = self.nodes.cpu().numpy()[kept]
+        other.nodes = torch.from_numpy(_with_means(vectors, np.arange(len(phones)) < len(kept), phones)).to(self.nodes)
+        return other
 
     def rescale(self, factors: Tensor) -> None:
         """Let the squared difference of each component [A] count by a factor."""
@@ -61,6 +71,14 @@ class PhoneSound(nn.Module):
         """What the search takes of it."""
         nodes, centre, basis, size = (part.cpu().numpy() for part in (self.nodes, self.pca.mean, self.pca.basis, self.size))
         return PhoneSounds(nodes, centre, basis, size, self.hearing.standard())
+
+
+def _with_means(vectors: NDArray[np.float32], recorded: NDArray[np.bool_], phones: Ints) -> NDArray[np.float32]:
+    """Sounds [N, A] in which a node that was not recorded has the mean of its phone's."""
+    for place in np.flatnonzero(~recorded):
+        alike = recorded & (phones == phones[place])
+        vectors[place] = vectors[alike].mean(axis=0) if alike.any() else 0.0
+    return vectors
 
 
 class AudioTerms(nn.Module):
@@ -97,6 +115,13 @@ class AudioTerms(nn.Module):
                 if getattr(other, name) is None:
                     raise FacesynthError(f"this model learned no {name}; train it with audio_weight or pose_weight above 0")
                 setattr(self, name, getattr(other, name))
+
+    def of_nodes(self, kept: Ints, phones: Ints) -> Self:
+        """The terms for another choice of nodes; see `PhoneSound.of_nodes`."""
+        other = type(self)(audio=False, pose=False)
+        other.sound = None if self.sound is None else self.sound.of_nodes(kept, phones)
+        other.predictor = self.predictor
+        return other
 
     def heard_by(self, nodes: Nodes, weights: tuple[float, float]) -> Hearing | None:
         """What the search hears with, if it hears at all; weights of sound and pose."""

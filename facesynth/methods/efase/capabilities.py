@@ -15,6 +15,12 @@ CAPABILITIES = Capabilities(
             "CSV of nodes that must be used: phone_index or time_s, utterance_id, phone_number.",
             reader="facesynth.methods.efase.constraints:read_constraints",
         ),
+        Option(
+            "edits",
+            Path,
+            "Nodes that must not be used and drawn ones that may be, as in a corpus's edits.jsonl, without training anew.",
+            reader="facesynth.methods.efase.edits:read_edits",
+        ),
     ),
     abilities=frozenset({Explaining, Accounting, Reporting, Joining, Editing, Browsing}),
     minutes=5.0,

@@ -1,6 +1,7 @@
 """The nodes of a database as clusters, one for each phone, to be put on maps."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,34 @@ def cluster_of(nodes: Nodes, names: Sequence[str], emotions: Sequence[str], fps:
 def frames_of(nodes: Nodes, which: Ints) -> Ints:
     """[n] the frames of some nodes, one node after the other."""
     return np.concatenate([np.arange(nodes.starts[k], nodes.stops[k]) for k in which])
+
+
+def map_beside(cluster: Cluster, frames: Ints, places: NDArray[np.float32]) -> PhoneMap:
+    """The map of a cluster whose n frames stand at `frames` [n] of the database; those that came after `places` [F, 2] of all
+    were made are placed among the others.
+    """
+    old = frames < len(places)
+    if old.all():
+        return PhoneMap.of(cluster, points=places[frames])
+    if not old.any():
+        return PhoneMap.of(cluster)
+    first = PhoneMap.of(_recorded(cluster, old), points=places[frames[old]])
+    points = np.empty((len(frames), 2))
+    points[old], points[~old] = places[frames[old]], first.placed(cluster.frames[~old])
+    return PhoneMap.of(cluster, points=points)
+
+
+def _recorded(cluster: Cluster, old: NDArray[np.bool_]) -> Cluster:
+    """The nodes of a cluster whose frames were there before."""
+    which = np.flatnonzero(old[cluster.starts])
+    return replace(
+        cluster,
+        names=tuple(cluster.names[k] for k in which.tolist()),
+        emotions=tuple(cluster.emotions[k] for k in which.tolist()),
+        contexts=tuple(cluster.contexts[k] for k in which.tolist()),
+        lengths=cluster.lengths[which],
+        frames=cluster.frames[old],
+    )
 
 
 def places_of_all(nodes: Nodes, names: Sequence[str], emotions: Sequence[str], fps: float, decode: Decode) -> NDArray[np.float32]:

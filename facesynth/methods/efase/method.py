@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
+from facesynth.corpus.journal import Edits
 from facesynth.inference.efase.assembly import Smoothing
 from facesynth.inference.efase.bounds import TABLES, step_bounds
+from facesynth.inference.efase.changed_bounds import changed_bounds
 from facesynth.inference.efase.costs import Query, Weights
-from facesynth.inference.efase.editing import EfaseEditor
 from facesynth.inference.efase.hearing import Heard
 from facesynth.inference.efase.model import Efase as Speaker
 from facesynth.inference.efase.model import Parts, Settings
@@ -29,7 +30,8 @@ from facesynth.methods.capabilities import Account
 from facesynth.methods.efase.audio import AudioTerms
 from facesynth.methods.efase.capabilities import CAPABILITIES
 from facesynth.methods.efase.database import build_database
-from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, mapped_phones, places_of_all
+from facesynth.methods.efase.edits import Changed, EditsEditor, changed_nodes, edits_key
+from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, map_beside, mapped_phones, places_of_all
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.torch_search import torch_engine
 from facesynth.methods.method import Method, Prepared
@@ -107,6 +109,7 @@ class Efase(Method):
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0)
         self._speaker: Speaker | None = None
+        self._edited: tuple[Any, Self] | None = None
 
     @classmethod
     def prepared(cls, config: Mapping[str, Any], corpus: Corpus, seed: int) -> Prepared:
@@ -127,7 +130,7 @@ class Efase(Method):
     def count_by(self, sound: Sequence[float], pose: Sequence[float]) -> None:
         """Let the squared differences of each component of the sound and of the pose count by these factors."""
         self.audio.count_by(sound, pose)
-        self._speaker = None
+        self._speaker = self._edited = None
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
@@ -139,6 +142,7 @@ class Efase(Method):
         nodes = database.nodes
         self.pca = database.pca.to(device)
         self.facts = {"names": list(database.names), "unusable_phones": database.unusable, "barren": list(database.barren)}
+        self.facts["removed"] = sorted(corpus.removed_nodes())
         self.register_buffer("node_frames", torch.from_numpy(nodes.frames.astype(np.float32)))
         self.register_buffer("node_table", torch.from_numpy(np.stack([getattr(nodes, column) for column in COLUMNS])))
         self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
@@ -240,34 +244,41 @@ class Efase(Method):
         seed: int = 0,
         fps: float | None = None,
         constraints: Mapping[int, str] | None = None,
+        edits: Edits | None = None,
         look_ahead: int | None = None,
         **options: Any,
     ) -> Motion:
         """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name.
 
-        look_ahead: settle each phone when that many more are known, as a stream does. See `inference.efase.model`.
+        edits: nodes that must not be used, and drawn ones that may be. look_ahead: settle each phone when that many more
+        are known, as a stream does. See `inference.efase.model`.
         """
-        return self.speaker.synthesize(speech, seed=seed, fps=fps, constraints=constraints, look_ahead=look_ahead, **options)
+        speaker = self.edited(edits).speaker
+        return speaker.synthesize(speech, seed=seed, fps=fps, constraints=constraints, look_ahead=look_ahead, **options)
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one, frames as soon as they are final; see `inference.efase.model`."""
         return self.speaker.stream(look_ahead=look_ahead, weakened=weakened, fps=fps)
 
-    def edit(self) -> EfaseEditor:
+    def edit(self) -> EditsEditor:
         """For speech that is changed again and again; see `inference.efase.editing`."""
-        return EfaseEditor(self.speaker)
+        return EditsEditor(self)
 
-    def explain(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> list[dict[str, Any]]:
+    def explain(
+        self, speech: Speech, *, constraints: Mapping[int, str] | None = None, edits: Edits | None = None
+    ) -> list[dict[str, Any]]:
         """Chosen node, cost terms and runners-up for each phone."""
-        return self.speaker.explain(speech, constraints=constraints)
+        return self.edited(edits).speaker.explain(speech, constraints=constraints)
 
-    def report(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> dict[str, float]:
+    def report(
+        self, speech: Speech, *, constraints: Mapping[int, str] | None = None, edits: Edits | None = None
+    ) -> dict[str, float]:
         """Shares of phones said by another phone, viseme class or emotion."""
-        return self.speaker.report(speech, constraints=constraints)
+        return self.edited(edits).speaker.report(speech, constraints=constraints)
 
-    def account(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> Account:
+    def account(self, speech: Speech, *, constraints: Mapping[int, str] | None = None, edits: Edits | None = None) -> Account:
         """The shares of `report`."""
-        return Account(self.report(speech, constraints=constraints))
+        return Account(self.report(speech, constraints=constraints, edits=edits))
 
     def mapped_phones(self) -> tuple[str, ...]:
         """Phones that have nodes, and so a map."""
@@ -277,10 +288,10 @@ class Efase(Method):
         """The frames of one phone's nodes on a plane, as it was kept in training or made now."""
         nodes, kept = self.nodes(), getattr(self, "map_points", None)
         cluster = cluster_of(*self._database(), phone)
-        if kind != "isomap" or kept is None or len(kept) != len(nodes.frames):
+        if kind != "isomap" or kept is None or not len(kept):
             return PhoneMap.of(cluster, kind)
-        which = np.flatnonzero(nodes.phones == PHONES.index(phone))
-        return PhoneMap.of(cluster, kind, kept.cpu().numpy()[frames_of(nodes, which)])
+        frames = frames_of(nodes, np.flatnonzero(nodes.phones == PHONES.index(phone)))
+        return map_beside(cluster, frames, kept.cpu().numpy())
 
     def joins(self, speech: Speech) -> Ints:
         """Frames, at the corpus's rate, at which nodes were joined that were not recorded in a row."""
@@ -288,19 +299,50 @@ class Efase(Method):
 
     def with_weights(self, **weights: float) -> Self:
         """The same database under other parameters of the cost, sharing its arrays."""
-        other = type(self).from_config({**self.config, **weights})
-        other.audio.share(self.audio)
-        other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
-        other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
-        for name in ("node_frames", "node_table", "rest", "map_points"):
+        other = self._sharing(weights)
+        for name in ("node_frames", "node_table", "map_points"):
             if hasattr(self, name):
                 other.register_buffer(name, getattr(self, name))
         other.facts["median_transition"] = median_transition(other.nodes(), replace(other.weights(), pnt=1.0))
         other._keep_bounds()
         return other
 
+    def edited(self, edits: Edits | None) -> Self:
+        """The model with nodes removed and added; the last one made is kept."""
+        key = edits_key(edits)
+        if edits is None or not (edits.removed or edits.added):
+            return self
+        if self._edited is None or self._edited[0] != key:
+            self._edited = key, self._changed(changed_nodes(self, edits))
+        return self._edited[1]
+
+    def _changed(self, changed: Changed) -> Self:
+        other, nodes, device = self._sharing({}), changed.nodes, self.node_frames.device
+        other.facts["names"] = changed.names
+        other.audio = self.audio.of_nodes(changed.kept, nodes.phones)
+        tables = {name: getattr(self, name).cpu().numpy() for name in TABLES}
+        arrays = {
+            "node_frames": nodes.frames,
+            "node_table": np.stack([getattr(nodes, column) for column in COLUMNS]),
+            **changed_bounds(self.nodes(), tables, changed.kept, nodes, self.weights()),
+        }
+        for name, array in arrays.items():
+            other.register_buffer(name, torch.from_numpy(array).to(device))
+        if hasattr(self, "map_points"):
+            other.register_buffer("map_points", self.map_points)
+        return other
+
+    def _sharing(self, weights: Mapping[str, float]) -> Self:
+        """Another model that knows what this one learned, but no nodes."""
+        other = type(self).from_config({**self.config, **weights})
+        other.audio.share(self.audio)
+        other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
+        other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
+        other.register_buffer("rest", self.rest)
+        return other
+
     def _keep_bounds(self) -> None:
-        self._speaker = None
+        self._speaker = self._edited = None
         for name, table in step_bounds(self.nodes(), self.weights()).items():
             self.register_buffer(name, torch.from_numpy(table).to(self.node_frames.device))
 
@@ -322,5 +364,5 @@ class Efase(Method):
 
     def _apply(self, fn: Any, recurse: bool = True) -> Self:
         """Arrays that move to another device are read anew."""
-        self._speaker = None
+        self._speaker = self._edited = None
         return super()._apply(fn, recurse)  # type: ignore[no-untyped-call]  # torch leaves it untyped
