@@ -61,9 +61,9 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
     clock = Clock()
     corpus = build_performer("small", seed=seed)
     clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
-    model, fresh = _trained(corpus, seed)
+    model, fresh = trained_model(corpus, seed)
     clock.step("train", f"{model.name}: {model.capabilities.summary}")
-    speech = _speech(seed)
+    speech = demo_speech(seed)
     clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
     stage = HeadStage.of(request)
     performance = stage.perform(model.synthesize(speech, seed=seed), speech, Cast(model))
@@ -98,7 +98,7 @@ def _strip(path: Path, performance: Performance, rig: Rig) -> Path:
     return path
 
 
-def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
+def trained_model(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     """The model for this corpus, from the cache or made now, and whether it was made now."""
     from facesynth import __version__
     from facesynth.cache import cache_dir
@@ -111,10 +111,11 @@ def _trained(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     if path.exists():
         return load(path), False
     model.fit(corpus, seed=seed).save(path)
+    model.path = path
     return model, True
 
 
-def _speech(seed: int) -> Speech:
+def demo_speech(seed: int) -> Speech:
     """What the demo says, from the cache or said now; what is read back is what was written, in both cases."""
     import numpy as np
 

@@ -3,14 +3,13 @@
 import csv
 import io
 import json
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from facesynth.atomic import write_text
 from facesynth.corpus.journal import parse_node
-from facesynth.inference.errors import unknown
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.capabilities import Capabilities
 from facesynth.speech.emotions import write_emotions
 from facesynth.speech.textgrid import write_textgrid
@@ -18,7 +17,7 @@ from facesynth.stage.request import Part, Request
 from facesynth.studio.document import Document, Take
 
 PHONES, EMOTIONS, CONSTRAINTS = "phones.TextGrid", "emotions.csv", "constraints.csv"
-OF_REQUEST = ("seed", "mouth", "head", "eyes")
+OF_REQUEST = ("seed", "mouth", "head", "eyes", "size")
 """What of `Request` a take may ask for, beside the model's own options."""
 PINS, NODES = "constraints", "edits"
 """Own options of models that take nodes from a person: which must be used, and which were removed or drawn."""
@@ -60,17 +59,37 @@ def request_of(take: Take, folder: Path, edits: Path | None, model: Capabilities
 
 def of_request(take: Take) -> dict[str, Any]:
     """Fields of `Request` that a take asks for by a value."""
-    asked = {name: value for name, value in take.options if name in OF_REQUEST}
-    return {name: Part.of(str(value)) if name in ("head", "eyes") else value for name, value in asked.items()}
+    return {name: _READ.get(name, _as_it_is)(value) for name, value in take.options if name in OF_REQUEST}
 
 
-def command_line(model: Path, sound: Path, request: Request, take: Take, outputs: Sequence[Path]) -> str:
-    """The same on the command line."""
-    words = ["facesynth", "speak", str(model), str(sound), "--phones", str(request.phones), "--emotions", str(request.emotions)]
+def arguments(model: Path, sound: Path, request: Request, take: Take, outputs: Sequence[Path]) -> list[str]:
+    """The same on the command line, after `facesynth`."""
+    words = ["speak", str(model), str(sound), "--phones", str(request.phones), "--emotions", str(request.emotions)]
     words += _flags(request.own)
     words += _flags({name: value for name, value in take.options if name in OF_REQUEST})
-    words += [word for output in outputs for word in ("-o", str(output))]
-    return shlex.join(words)
+    return [*words, *(word for output in outputs for word in ("-o", str(output)))]
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def _part(value: Any) -> Part:
+    """Of head or eyes; a model of them is named on the command line alone, for it is a file."""
+    part = Part.of(str(value))
+    if part.model is not None:
+        raise FacesynthError(f"wanted off, recorded or a factor such as 0.5; got {value!r:.40}")
+    return part
+
+
+def _size(value: Any) -> tuple[int, int]:
+    width, _, height = str(value).partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise FacesynthError(f"size wants WIDTHxHEIGHT in pixels such as 1280x720; got {value!r:.40}")
+    return int(width), int(height)
+
+
+_READ: Mapping[str, Callable[[Any], Any]] = {"head": _part, "eyes": _part, "size": _size}
 
 
 def _flags(values: Mapping[str, Any]) -> list[str]:

@@ -18,7 +18,7 @@ from facesynth.studio.library import Signature, corpus_facts, differing, recorde
 from facesynth.studio.messages import project_facts
 from facesynth.studio.performing import Performing, Shown, model_facts
 from facesynth.studio.project import Kept, Project
-from facesynth.studio.speak_files import command_line, request_of
+from facesynth.studio.speak_files import arguments, request_of
 
 LOOK_EVERY_S = 2.0
 """Between looks at the disk."""
@@ -130,8 +130,8 @@ class Studio:
         edits = folder / "edits.jsonl" if edited else None
         request = request_of(said, self.project.take_folder(line, take), edits, performing.model.capabilities)
         outputs = [folder / "exports" / f"{line}-{take}{suffix}" for suffix in suffixes]
-        command = command_line(self._model_path(), self.project.sound(line), request, said, outputs)
-        return self.jobs.start(f"export {line}, take {take}", command)
+        words = arguments(self._model_path(), self.project.sound(line), request, said, outputs)
+        return self.jobs.start(f"export {line}, take {take}", words)
 
     def train(self, method: str) -> Job:
         """Let the command line learn a model of the corpus, and use it when it is there."""

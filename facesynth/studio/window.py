@@ -110,6 +110,7 @@ class SocketWindow:
         line = document.line(wanted.line)
         take, sound = line.take(wanted.take), studio.project.sound(wanted.line)
         about = {"line": wanted.line, "take": wanted.take, "number": wanted.number, "trial": wanted.trial is not None}
+        about["revision"] = studio.project.revision
         shown = await studio.away(performing.whole, sound, document, line, take)
         await self._send(face_message(shown, **about))
         if wanted.trial is None and self._wanted is None:

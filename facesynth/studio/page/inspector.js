@@ -187,6 +187,7 @@ const OF_SPEAK = [
   { name: "mouth", type: "float", help: "Factor on the movement of mouth and jaw; 1 as it is.", least: 0, most: null },
   { name: "head", type: "str", help: "off, recorded, or a factor on the head's motion; 1 as it is." },
   { name: "eyes", type: "str", help: "off, recorded, or a factor on the gaze; 1 as it is." },
+  { name: "size", type: "str", help: "Of exported video, WIDTHxHEIGHT in pixels; 1280x720 otherwise." },
   { name: "seed", type: "int", help: "Of everything random.", least: 0, most: null },
 ];
 

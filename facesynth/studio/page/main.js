@@ -52,6 +52,7 @@ function listen() {
   on("choices", (message) => {
     if (message.line !== store.line || message.take !== store.take) return;
     store.choices = message.rows;
+    store.choicesRevision = message.revision;
     changed("choices");
   });
   on("corpus", (message) => {
@@ -76,6 +77,7 @@ function heardFace(message) {
     store.settled = { key: [store.line, store.take].join("\n"), motion };
   }
   store.motion = motion;
+  if (!message.trial) store.shownRevision = message.revision;
   const asked = timeline.trials.asked.get(message.number);
   if (message.trial && asked) {
     timeline.trials.asked.delete(message.number);

@@ -265,4 +265,10 @@ function nudge(seconds) {
   return changeTake("move_boundary", { phone: store.phone, end_s });
 }
 
+/** Where a moment is on a lane, px on the page: for tests and benchmarks. */
+export function placeOf(time, lane) {
+  const box = canvas.getBoundingClientRect();
+  return [box.left + x(time), box.top + layout[lane].top + layout[lane].height / 2];
+}
+
 export { choosePhone };
