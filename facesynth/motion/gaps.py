@@ -1,11 +1,12 @@
 """Missing samples: which are filled, which stay missing, and an account of both."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 
 LONGEST_S = 0.1
 """Longest gap that is filled, seconds: about the shortest movement that one could miss."""
@@ -60,6 +61,30 @@ def fill_gaps(
         _interpolate(points[:, k], ~missing[:, k], [gap for gap in short if gap.point == k])
     left = sorted(set(gaps) - set(short), key=lambda gap: (gap.point, gap.start))
     return points.reshape(frames.shape), GapReport(missing.size, sum(map(len, short)), tuple(left))
+
+
+def for_looking(motion: Motion) -> Motion:
+    """A recording with every gap filled, so that it can be shown; whoever learns or measures leaves long gaps open.
+
+    Gaps inside are interpolated, those at the edges hold the nearest sample; a point that is never seen rests at 0, or at its
+    place in the layout's neutral pose where that is known.
+    """
+    frames, _ = fill_gaps(motion.frames, motion.fps, motion.layout.dimension, longest_s=motion.duration_s + 1)
+    for channel in np.flatnonzero(np.isnan(frames).any(axis=0)):
+        known = np.flatnonzero(np.isfinite(frames[:, channel]))
+        if len(known):
+            frames[:, channel] = np.interp(np.arange(len(frames)), known, frames[known, channel])
+        else:
+            frames[:, channel] = 0.0 if motion.layout.neutral is None else motion.layout.neutral[channel]
+    return replace(motion, frames=frames, head=_held(motion.head), eyes=_held(motion.eyes))
+
+
+def _held(part: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+    """Head or eyes [T, n] with gaps filled from beside; None where nothing of it was recorded."""
+    if part is None or not np.isfinite(part).all(axis=1).any():
+        return None
+    known = np.flatnonzero(np.isfinite(part).all(axis=1))
+    return np.stack([np.interp(np.arange(len(part)), known, column[known]) for column in part.T], axis=1).astype(np.float32)
 
 
 def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:

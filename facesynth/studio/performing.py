@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any, Self
 
@@ -9,21 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.face.animation import FaceAnimation
-from facesynth.face.rig.channel_map import on_channels
-from facesynth.face.rig.own_head import OwnHead
+from facesynth.face.behaviour.eyes import still_eyes
+from facesynth.face.solve.animate import animate
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
-from facesynth.methods.capabilities import Explaining
+from facesynth.methods.capabilities import Browsing, Explaining
 from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, require
+from facesynth.motion.gaps import for_looking
 from facesynth.speech.audio import load_audio
 from facesynth.stage.cast import Cast, cast_for
-from facesynth.stage.performance import HeadStage, Performance
-from facesynth.stage.request import Request
+from facesynth.stage.preview import Preview, Previewed
+from facesynth.stage.request import Part, Request
 from facesynth.studio.document import Document, Line, Take
 from facesynth.studio.speak_files import NODES, PINS, of_request, own_options
 
 SOUNDS_KEPT = 4
+REACH_S = 0.2
+"""Around what changed, frames may look otherwise, too: weights are solved together with their neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +45,26 @@ class Shown:
 
 
 class Performing:
-    """A model and a head, ready for take after take."""
+    """A model and a head, ready for take after take; one thread at a time."""
 
-    def __init__(self, model: Method, stage: HeadStage) -> None:
-        self.model, self._stage = model, stage
+    def __init__(self, model: Method, request: Request) -> None:
+        self.model, self._request = model, request
+        self._preview = Preview(cast_for(model, request), request)
         self._sounds: dict[Path, tuple[NDArray[np.float32], int]] = {}
+        self._shown: tuple[str, str] | None = None
+        self._changes: list[tuple[int, float, float]] = []
+        self.generation = 0
+        """Rises with everything that is asked for."""
 
     @classmethod
     def of(cls, model: Method, rig: Path | None = None, mapping: Path | None = None) -> Self:
         """For a trained model, on the built-in head or on one's own."""
-        return cls(model, HeadStage.of(Request(rig=rig, mapping=mapping)))
+        return cls(model, Request(rig=rig, mapping=mapping))
 
     @property
     def head(self) -> Any:
         """What is shown: the built-in head, or one's own."""
-        return self._stage.own or self._stage.rig
+        return self._preview.stage.own or self._preview.stage.rig
 
     def speech(self, sound: Path, line: Line, take: Take) -> Speech:
         """What a take says."""
@@ -66,45 +74,57 @@ class Performing:
                 del self._sounds[old]
         return Speech(*self._sounds[sound], take.phone_track(), take.emotion_track(), line.text)
 
+    def change(self, sound: Path, document: Document, line: Line, take: Take) -> Previewed:
+        """A take as it stands; its parts are made when they are asked for."""
+        now = self._preview.change(self.speech(sound, line, take), self._asked(document, take))
+        self.generation += 1
+        if self._shown != (line.name, take.name):
+            self._shown, self._changes = (line.name, take.name), [(self.generation, 0.0, inf)]
+        elif now.draft.changed_s is not None:
+            start_s, stop_s = now.draft.changed_s
+            self._changes.append((self.generation, start_s - REACH_S, stop_s + REACH_S))
+        return now
+
+    def stale(self, generation: int, start_s: float, stop_s: float) -> bool:
+        """Whether a stretch of what is shown now may look otherwise than it did at a generation."""
+        return any(number > generation and start_s < b and a < stop_s for number, a, b in self._changes)
+
+    def stretch(self, now: Previewed, start_s: float, stop_s: float) -> Shown:
+        """Frames of a take."""
+        animation = now.animation(start_s, stop_s)
+        count = max(round(now.speech.duration_s * animation.fps), 1)
+        return _rows(animation, min(round(start_s * animation.fps), count - 1), count)
+
     def whole(self, sound: Path, document: Document, line: Line, take: Take) -> Shown:
         """The whole face of a take."""
-        return self._shown(self._performance(sound, document, line, take).animation)
-
-    def explanation(self, sound: Path, document: Document, line: Line, take: Take) -> list[dict[str, Any]]:
-        """Why each phone got its motion; nothing where the model does not tell."""
-        if ask(self.model, Explaining) is None:
-            return []
-        speech = self.speech(sound, line, take)
-        cast, request = self._asked(document, take)
-        return require(self.model, Explaining).explain(speech, **cast.options(request, speech.phones))
+        now = self.change(sound, document, line, take)
+        return self.stretch(now, 0.0, now.speech.duration_s)
 
     def of_motion(self, motion: Motion, speech: Speech) -> Shown:
-        """A recording on the head."""
-        stage = replace(self._stage, request=replace(self._stage.request, **of_request(_RECORDED)))
-        return self._shown(stage.perform(motion, speech, Cast(self.model)).animation)
+        """A recording on the head, gaps filled so that it can be looked at."""
+        request = replace(self._request, head=Part("recorded"), eyes=Part("recorded"))
+        stage = replace(self._preview.stage, request=request)
+        animation = self._preview.shown(stage.perform(for_looking(motion), speech, Cast(self.model)).animation)
+        return _rows(animation, 0, len(animation))
 
-    def _performance(self, sound: Path, document: Document, line: Line, take: Take) -> Performance:
-        speech = self.speech(sound, line, take)
-        cast, request = self._asked(document, take)
-        motion = cast.motion(speech, request, cast.options(request, speech.phones))
-        return replace(self._stage, request=request).perform(motion, speech, cast)
+    def of_frames(self, frames: NDArray[np.float32], fps: float) -> Shown:
+        """Frames [T, C] of the mouth's layout on a head that holds still."""
+        stage = self._preview.stage
+        motion = stage.as_arkit(Motion(frames, fps, self.model.fitted_layout))
+        animation = self._preview.shown(animate(motion, stage.rig, head_gain=0.0, eyes=still_eyes))
+        return _rows(animation, 0, len(animation))
 
-    def _asked(self, document: Document, take: Take) -> tuple[Cast, Request]:
+    def _asked(self, document: Document, take: Take) -> Request:
         """The same as for the files of the take, without the files."""
         own: dict[str, Any] = dict(own_options(take, self.model.capabilities))
         if take.pins and self.model.capabilities.option(PINS):
             own[PINS] = {pin.phone: pin.node for pin in take.pins}
-        request = replace(self._stage.request, own=own, **of_request(take))
-        return cast_for(self.model, request), request
-
-    def _shown(self, animation: FaceAnimation) -> Shown:
-        head = self._stage.own
-        shown = on_channels(animation, head.map) if isinstance(head, OwnHead) else animation
-        parts = [shown.weights, shown.head, shown.gaze, shown.tongue_up[:, None]]
-        return Shown(shown.names, np.concatenate(parts, axis=1).astype(np.float32), shown.fps, 0, len(shown))
+        return replace(self._request, own=own, **of_request(take))
 
 
-_RECORDED = Take("", (), (), (), options=(("eyes", "recorded"), ("head", "recorded")))
+def _rows(animation: FaceAnimation, start: int, count: int) -> Shown:
+    parts = [animation.weights, animation.head, animation.gaze, animation.tongue_up[:, None]]
+    return Shown(animation.names, np.concatenate(parts, axis=1).astype(np.float32), animation.fps, start, count)
 
 
 def model_facts(model: Method, path: Path) -> Mapping[str, Any]:
@@ -123,5 +143,6 @@ def model_facts(model: Method, path: Path) -> Mapping[str, Any]:
         "options": options,
         "pins": stated.option(PINS) is not None,
         "edits": stated.option(NODES) is not None,
+        "mapped": list(model.mapped_phones()) if isinstance(model, Browsing) else [],
         "explains": Explaining in stated.abilities,
     }

@@ -16,6 +16,7 @@ from facesynth.studio.document import first_take, take_facts
 from facesynth.studio.jobs import Job, Jobs
 from facesynth.studio.library import Signature, corpus_facts, differing, recorded, signature
 from facesynth.studio.messages import project_facts
+from facesynth.studio.node_maps import NodeMaps
 from facesynth.studio.performing import Performing, Shown, model_facts
 from facesynth.studio.project import Kept, Project
 from facesynth.studio.speak_files import arguments, request_of
@@ -44,6 +45,7 @@ class Studio:
         self.project, self.corpus, self.model, self.performing = project, Corpus.open(corpus), model, performing
         self.windows: set[Window] = set()
         self.jobs = Jobs(self._tell_job)
+        self._maps: tuple[Performing, NodeMaps] | None = None
         self._thread = ThreadPoolExecutor(1, "studio")
         self._seen: Signature = signature(self.corpus.path, model)
 
@@ -85,6 +87,13 @@ class Studio:
         if self.performing is None:
             raise FacesynthError("there is no model yet: train one on the page of the corpus, or start the studio with one")
         return self.performing
+
+    def require_maps(self) -> NodeMaps:
+        """The maps of the model's nodes; FacesynthError where it has none."""
+        performing = self.require_performing()
+        if self._maps is None or self._maps[0] is not performing:
+            self._maps = performing, NodeMaps(performing.model)
+        return self._maps[1]
 
     async def show(self, line: str, take: str) -> Shown:
         """The whole face of a take as it is."""

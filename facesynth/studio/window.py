@@ -3,7 +3,9 @@
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil, floor
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -11,9 +13,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from facesynth.inference.errors import FacesynthError
 from facesynth.studio.document import Document
 from facesynth.studio.library import set_text
+from facesynth.studio.map_questions import QUESTIONS
 from facesynth.studio.messages import face_message, parsed
+from facesynth.studio.performing import Performing
 from facesynth.studio.project import Kept
 from facesynth.studio.studio import Studio
+
+NEAR_S = 1.0
+"""Before and after the playhead, what is made first."""
+LONGEST_S = 1e6
+"""Further than that no line goes, whatever a page says."""
+BATCH_S = 4
+"""So much is made at once after that."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +35,10 @@ class Wanted:
     take: str
     trial: Document | None = None
     """Of a change that is being dragged and not kept; None: the project's own."""
+    at_s: float = 0.0
+    """The playhead, s."""
+    sight_s: tuple[float, float] = (0.0, 0.0)
+    """Start and end of what the timeline shows."""
     number: int = 0
     """Of the message that asked, so that the page can tell how long it took."""
 
@@ -34,6 +49,8 @@ class SocketWindow:
     def __init__(self, studio: Studio, socket: WebSocket) -> None:
         self._studio, self._socket = studio, socket
         self._wanted: Wanted | None = None
+        self._fresh: dict[tuple[Performing, str, str], dict[int, int]] = {}
+        """Of each take, the generation at which each second of it was sent last."""
         self._shown: Wanted | None = None
         self._news = asyncio.Event()
         self._sending = asyncio.Lock()
@@ -60,7 +77,7 @@ class SocketWindow:
     def refresh(self, kept: Kept) -> None:
         """Show anew what a change may have changed."""
         if self._shown is not None and (kept.nodes or self._shown.line in kept.lines):
-            self._want(Wanted(self._shown.line, self._shown.take))
+            self._want(replace(self._shown, number=0))
 
     async def _send(self, message: str | bytes) -> None:
         async with self._sending:
@@ -74,10 +91,7 @@ class SocketWindow:
         try:
             message = parsed(text)
             number = message.get("id")
-            handler = _OPS.get(message["op"])
-            if handler is None:
-                raise FacesynthError(f"the studio does nothing called {message['op']!r:.40}")
-            answer = await handler(self, message)
+            answer = await self._done(message)
             await self.tell({"kind": "answer", "id": number, "ok": True, **(answer or {})})
         except FacesynthError as error:
             await self.tell({"kind": "answer", "id": number, "ok": False, "error": " ".join(str(error).split())})
@@ -85,6 +99,13 @@ class SocketWindow:
             await self.tell(
                 {"kind": "answer", "id": number, "ok": False, "error": f"this message is not understood ({error!r:.80})"}
             )
+
+    async def _done(self, message: dict[str, Any]) -> dict[str, Any] | None:
+        if (question := QUESTIONS.get(message["op"])) is not None:
+            return await question(self._studio, message, self._send)
+        if (handler := _OPS.get(message["op"])) is None:
+            raise FacesynthError(f"the studio does nothing called {message['op']!r:.40}")
+        return await handler(self, message)
 
     def _want(self, wanted: Wanted) -> None:
         self._wanted = wanted
@@ -104,6 +125,7 @@ class SocketWindow:
                 await self.tell({"kind": "note", "lines": [f"{wanted.line}, take {wanted.take}: {error}"]})
 
     async def _show_one(self, wanted: Wanted) -> None:
+        """What is near the playhead first, then what is in sight, then the rest; given up for what is newer."""
         studio = self._studio
         performing = studio.require_performing()
         document = wanted.trial or studio.project.document
@@ -111,22 +133,32 @@ class SocketWindow:
         take, sound = line.take(wanted.take), studio.project.sound(wanted.line)
         about = {"line": wanted.line, "take": wanted.take, "number": wanted.number, "trial": wanted.trial is not None}
         about["revision"] = studio.project.revision
-        shown = await studio.away(performing.whole, sound, document, line, take)
-        await self._send(face_message(shown, **about))
+        now = await studio.away(performing.change, sound, document, line, take)
+        pieces = self._fresh.setdefault((performing, wanted.line, wanted.take), {})
+        order = near_first(now.speech.duration_s, wanted.at_s, wanted.sight_s)
+        batches = [batch for batch in order if any(performing.stale(pieces.get(k, 0), k, k + 1) for k in batch)] or order[:1]
+        generation = performing.generation
+        for number, batch in enumerate(batches[:1] if wanted.trial else batches, start=1):
+            if self._wanted is not None and number > 1:
+                return
+            shown = await studio.away(performing.stretch, now, float(batch.start), float(batch.stop))
+            await self._send(face_message(shown, last=number == len(batches), **about))
+            pieces |= dict.fromkeys(batch, generation)
         if wanted.trial is None and self._wanted is None:
-            rows = await studio.away(performing.explanation, sound, document, line, take)
-            await self.tell({"kind": "choices", **about, "rows": rows})
+            await self.tell({"kind": "choices", **about, "rows": await studio.away(now.draft.choices)})
 
     async def _op_change(self, message: dict[str, Any]) -> dict[str, Any]:
+        if self._shown is not None and "at" in message:
+            self._shown = replace(self._shown, **_sight(message))
         kept = await self._studio.change(str(message["do"]), dict(message["with"]), message.get("base"))
         return {"revision": kept.revision}
 
     async def _op_trial(self, message: dict[str, Any]) -> None:
         trial = self._studio.project.trial(str(message["do"]), dict(message["with"]))
-        self._want(Wanted(str(message["line"]), str(message["take"]), trial, int(message["id"])))
+        self._want(_wanted(message, trial))
 
     async def _op_show(self, message: dict[str, Any]) -> None:
-        self._shown = Wanted(str(message["line"]), str(message["take"]), None, int(message["id"]))
+        self._shown = _wanted(message, None)
         self._studio.project.document.line(self._shown.line).take(self._shown.take)
         self._want(self._shown)
 
@@ -169,3 +201,33 @@ class SocketWindow:
 _OPS: Mapping[str, Callable[[SocketWindow, dict[str, Any]], Awaitable[dict[str, Any] | None]]] = {
     name.removeprefix("_op_"): handler for name, handler in vars(SocketWindow).items() if name.startswith("_op_")
 }
+
+
+def _wanted(message: dict[str, Any], trial: Document | None) -> Wanted:
+    return Wanted(str(message["line"]), str(message["take"]), trial, number=int(message["id"]), **_sight(message))
+
+
+def _sight(message: dict[str, Any]) -> dict[str, Any]:
+    """The playhead and what the timeline shows, seconds."""
+    at_s, start_s, end_s = (min(max(float(message.get(name, 0)), 0.0), LONGEST_S) for name in ("at", "from", "to"))
+    return {"at_s": at_s, "sight_s": (start_s, end_s)}
+
+
+def near_first(duration_s: float, at_s: float, sight_s: tuple[float, float]) -> list[range]:
+    """Seconds of a take in the order in which they are made: around the playhead, in sight, the rest; together all of them."""
+    count = max(ceil(duration_s), 1)
+    first = range(min(max(floor(at_s - NEAR_S), 0), count - 1), min(max(ceil(at_s + NEAR_S), 1), count))
+    seen = range(max(floor(sight_s[0]), 0), min(ceil(sight_s[1]), count))
+    order: list[range] = [first]
+    made = set(first)
+    for stretch in (seen, range(count)):
+        for start in range(stretch.start, stretch.stop, BATCH_S):
+            order += _runs([k for k in range(start, min(start + BATCH_S, stretch.stop)) if k not in made])
+            made |= set(range(start, min(start + BATCH_S, stretch.stop)))
+    return order
+
+
+def _runs(numbers: list[int]) -> list[range]:
+    """Numbers that follow one another, as ranges."""
+    cuts = [0, *(i for i in range(1, len(numbers)) if numbers[i] != numbers[i - 1] + 1), len(numbers)]
+    return [range(numbers[a], numbers[b - 1] + 1) for a, b in pairwise(cuts) if b > a]

@@ -96,7 +96,7 @@ def export(page, project):
     page.after(lambda: page.page.keyboard.press("Tab"))
     page.page.click("#export")
     page.page.click("#export-start")
-    page.until("[...facesynth.store.jobs.values()].some((job) => job.code !== null)")
+    page.until("[...facesynth.store.jobs.values()].some((job) => job.code !== null)", within_s=400)
     job = page.see("[...facesynth.store.jobs.values()][0]")
     assert job["code"] == 0, job
     names = page.page.eval_on_selector_all("#export-jobs a", "links => links.map((link) => link.download)")

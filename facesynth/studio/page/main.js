@@ -65,19 +65,15 @@ function listen() {
 }
 
 function heardFace(message) {
-  if (message.line !== store.line || message.utterance !== undefined) return;
+  if (message.line === undefined || message.line !== store.line) return;
   if (message.ghost) {
     store.compared = motionOf(message);
     return changed("motion");
   }
   if (message.take !== store.take) return;
   const motion = motionOf(message, store.motion);
-  if (!message.trial && message.whole !== false) {
-    if (store.settled && store.settled.key === [store.line, store.take].join("\n")) store.before = store.settled.motion;
-    store.settled = { key: [store.line, store.take].join("\n"), motion };
-  }
   store.motion = motion;
-  if (!message.trial) store.shownRevision = message.revision;
+  if (!message.trial && message.last) settle(message.revision);
   const asked = timeline.trials.asked.get(message.number);
   if (message.trial && asked) {
     timeline.trials.asked.delete(message.number);
@@ -86,11 +82,23 @@ function heardFace(message) {
   changed("motion");
 }
 
+/** The motion is whole again: what it was before stays as a ghost. */
+function settle(revision) {
+  const key = [store.line, store.take].join("\n");
+  if (store.settled?.key === key && store.settled.revision !== revision) store.before = store.settled.motion;
+  if (store.settled?.revision !== revision || store.settled.key !== key) {
+    store.settled = { key, revision, motion: { ...store.motion, rows: store.motion.rows.slice() } };
+  }
+  store.shownRevision = revision;
+}
+
 function pose() {
-  if (!face || !store.motion) return;
+  if (!face) return;
+  if (!store.motion) return store.picked ? face.pose(store.picked.rows, store.picked.names) : undefined;
   const time = sound.time();
   const row = rowAt(store.motion, time);
-  face.pose(row, store.motion.names);
+  if (store.picked) face.pose(store.picked.rows, store.picked.names);
+  else face.pose(row, store.motion.names);
   const wanted = byId("ghost").value;
   const own = store.recording?.own ? store.recording : null;
   const pale = { before: store.before, recording: own, take: store.compared }[wanted];
@@ -220,5 +228,5 @@ function keys() {
 }
 
 // For benchmarks and tests, which look and do not touch.
-window.facesynth = { store, measured, sound, timeline, get face() { return face; } };
+window.facesynth = { store, measured, sound, timeline, map, get face() { return face; } };
 begin().catch((error) => say(`the page cannot begin: ${error.message}`, true));

@@ -60,7 +60,7 @@ export const say = (text, bad = false) => report(text, bad);
 /** Make a change of the project; what is wrong with it is said, and null given. */
 export async function change(name, facts, said = "") {
   try {
-    const answer = await ask("change", { do: name, with: facts, base: store.project.revision });
+    const answer = await ask("change", { do: name, with: facts, base: store.project.revision, ...seen() });
     if (said) say(said);
     return answer;
   } catch (error) {
@@ -101,15 +101,22 @@ export function choose(line, take) {
 
 /** Ask for the face of what is chosen. */
 export function show() {
-  if (store.line && store.model) ask("show", { line: store.line, take: store.take }).catch((error) => say(error.message, true));
+  if (store.line && store.model) ask("show", { line: store.line, take: store.take, ...sight() }).catch((error) => say(error.message, true));
 }
 
-/** A motion from a message; a stretch of one is laid into what was known of it. */
+let sight = () => ({});
+/** Who says which stretch is looked at: { at, from, to } in seconds. */
+export function sightFrom(teller) {
+  sight = teller;
+}
+export const seen = () => sight();
+
+/** A motion from a message; a stretch of one is laid into what is known of it. */
 export function motionOf(message, known) {
   const { names, columns, count, fps, start, numbers } = message;
   if (start === 0 && numbers.length === count * columns) return { names, columns, count, fps, rows: numbers };
-  const rows = new Float32Array(count * columns);
-  if (known && known.columns === columns) rows.set(known.rows.subarray(0, Math.min(rows.length, known.rows.length)));
+  const fits = known && known.columns === columns && known.count === count;
+  const rows = fits ? known.rows : new Float32Array(count * columns);
   rows.set(numbers, start * columns);
   return { names, columns, count, fps, rows };
 }

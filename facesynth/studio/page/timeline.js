@@ -1,7 +1,7 @@
 // The timeline: what is said, felt and chosen over time; boundaries are dragged here.
 
 import { ask, lastNumber } from "/page/link.js";
-import { store, watch, changed, currentTake, changeTake, startOf, indexAt, duration, say } from "/page/store.js";
+import { store, watch, changed, currentTake, changeTake, startOf, indexAt, duration, seen, sightFrom, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
 import { view, x, at, all, zoom, scroll, follow, snapped } from "/page/view.js";
 import * as lanes from "/page/lanes.js";
@@ -15,6 +15,7 @@ let wanted = false;
 export const counted = { drawn: 0 };
 
 export function begin() {
+  sightFrom(() => ({ at: sound.time(), from: view.start, to: view.end }));
   new ResizeObserver(fit).observe(canvas);
   watch("project selection motion choices recording time", draw);
   watch("choice", () => {
@@ -200,7 +201,7 @@ async function trial(name, facts) {
   while (nextTrial) {
     const [doing, said] = nextTrial;
     nextTrial = null;
-    const answer = ask("trial", { line: store.line, take: store.take, do: doing, with: { line: store.line, take: store.take, ...said }, at: sound.time(), from: view.start, to: view.end });
+    const answer = ask("trial", { line: store.line, take: store.take, do: doing, with: { line: store.line, take: store.take, ...said }, ...seen() });
     trials.asked.set(lastNumber(), performance.now());
     await answer.catch((error) => say(error.message, true));
   }
@@ -269,6 +270,13 @@ function nudge(seconds) {
 export function placeOf(time, lane) {
   const box = canvas.getBoundingClientRect();
   return [box.left + x(time), box.top + layout[lane].top + layout[lane].height / 2];
+}
+
+/** Number of the phone at a place of the page; null outside of the timeline. */
+export function phoneUnder(pageX, pageY) {
+  const box = canvas.getBoundingClientRect();
+  const inside = pageX >= box.left && pageX <= box.right && pageY >= box.top && pageY <= box.bottom;
+  return inside && currentTake() ? indexAt(currentTake().phones, at(pageX - box.left)) : null;
 }
 
 export { choosePhone };
