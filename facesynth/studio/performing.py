@@ -17,6 +17,7 @@ from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Browsing, Explaining
 from facesynth.methods.method import Method
 from facesynth.motion.gaps import for_looking
+from facesynth.motion.maps.phone_map import emotion_colours
 from facesynth.speech.audio import load_audio
 from facesynth.stage.cast import Cast, cast_for
 from facesynth.stage.preview import Preview, Previewed
@@ -140,6 +141,7 @@ def model_facts(model: Method, path: Path) -> Mapping[str, Any]:
         "method": stated.name,
         "summary": stated.summary,
         "emotions": list(model.emotions),
+        "colours": emotion_colours(model.emotions),
         "options": options,
         "pins": stated.option(PINS) is not None,
         "edits": stated.option(NODES) is not None,

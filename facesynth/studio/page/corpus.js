@@ -75,7 +75,7 @@ function problemRows() {
 }
 
 function table(corpus) {
-  const heads = ["", "Utterance", "What is said", "Emotion", "Take", "Length", "Phones", "Usable"].map((text) => make("th", { textContent: text, scope: "col" }));
+  const heads = ["Choose", "Utterance", "What is said", "Emotion", "Take", "Length", "Phones", "Usable"].map((text) => make("th", { textContent: text, scope: "col" }));
   return make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...corpus.utterances.map(row)));
 }
 

@@ -167,9 +167,9 @@ function showTable(take) {
       make("td", {}, choice(PHONES, label, { "aria-label": `Label of phone ${k}`, onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) })),
       make("td", { textContent: startOf(take, k).toFixed(3) }), make("td", {}, field),
       make("td", { className: `quality ${quality ?? ""}`, textContent: quality ? `${QUALITY[quality].slice(0, 1)} ${store.choices[k].node}` : "" }),
-      make("td", { textContent: pins.get(k) ? "constrained" : "" }));
+      make("td", { textContent: pins.get(k) ? "yes" : "" }));
   });
-  const heads = ["Phone", "Label", "From", "To", "Node", ""].map((text) => make("th", { textContent: text, scope: "col" }));
+  const heads = ["Phone", "Label", "From", "To", "Node", "Constrained"].map((text) => make("th", { textContent: text, scope: "col" }));
   return [make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...rows))];
 }
 

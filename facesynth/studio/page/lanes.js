@@ -21,7 +21,12 @@ export function lanesOf(height) {
   return lanes;
 }
 
-export const colourOf = (emotion) => EMOTIONS[Math.max(0, (store.model?.emotions ?? store.corpus?.emotions ?? []).indexOf(emotion)) % EMOTIONS.length];
+/** As on the maps; where there are none, by the order of the emotions. */
+export function colourOf(emotion) {
+  const known = store.model?.colours[emotion];
+  if (known) return `rgb(${known.map((part) => Math.round(255 * part)).join(" ")})`;
+  return EMOTIONS[Math.max(0, (store.corpus?.emotions ?? []).indexOf(emotion)) % EMOTIONS.length];
+}
 
 /** How good a chosen node is: right, viseme or other; none for silence. */
 export function qualityOf(row) {
