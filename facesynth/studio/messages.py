@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.studio.document import Document, Line, take_facts
+from facesynth.studio.document import Line, take_facts
 from facesynth.studio.performing import Shown
 from facesynth.studio.project import Project
 
@@ -48,14 +48,15 @@ def project_facts(project: Project, lines: Collection[str] | None = None) -> dic
         "order": [line.name for line in document.lines],
         "lines": shown,
         "removed": document.removed,
-        "drawn": drawn_facts(document),
+        "drawn": drawn_facts(project),
     }
 
 
-def drawn_facts(document: Document) -> list[dict[str, Any]]:
+def drawn_facts(project: Project) -> list[dict[str, Any]]:
     """Drawn nodes without their frames."""
     return [
-        {"title": node.title, "phone": node.phone, "emotion": node.emotion, "frames": len(node.frames)} for node in document.drawn
+        {"node": name, "title": node.title, "phone": node.phone, "emotion": node.emotion, "frames": len(node.frames)}
+        for name, node in project.drawn
     ]
 
 

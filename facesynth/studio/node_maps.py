@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.capabilities import Browsing
 from facesynth.methods.method import Method
 from facesynth.methods.registry import require
-from facesynth.motion.maps.phone_map import KINDS, Drawn, Kind, PhoneMap
+from facesynth.motion.maps.phone_map import KINDS, Drawn, PhoneMap
 from facesynth.speech.textgrid import read_textgrid
 
 MAPS_KEPT = 6
@@ -51,7 +51,7 @@ class NodeMaps:
         if key not in self._made:
             for old in list(self._made)[: -MAPS_KEPT + 1]:
                 del self._made[old]
-            self._made[key] = self._model.phone_map(phone, cast("Kind", kind))
+            self._made[key] = self._model.phone_map(phone, kind)
         return self._made[key]
 
     def picked(self, phone: str, kind: str, place: Sequence[float]) -> Picked:

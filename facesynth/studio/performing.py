@@ -16,13 +16,14 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Browsing, Explaining
 from facesynth.methods.method import Method
+from facesynth.methods.registry import require
 from facesynth.motion.gaps import for_looking
 from facesynth.motion.maps.phone_map import emotion_colours
 from facesynth.speech.audio import load_audio
 from facesynth.stage.cast import Cast, cast_for
 from facesynth.stage.preview import Preview, Previewed
 from facesynth.stage.request import Part, Request
-from facesynth.studio.document import Document, Line, Take
+from facesynth.studio.document import Line, Take
 from facesynth.studio.speak_files import NODES, PINS, of_request, own_options
 
 SOUNDS_KEPT = 4
@@ -75,9 +76,9 @@ class Performing:
                 del self._sounds[old]
         return Speech(*self._sounds[sound], take.phone_track(), take.emotion_track(), line.text)
 
-    def change(self, sound: Path, document: Document, line: Line, take: Take) -> Previewed:
-        """A take as it stands; its parts are made when they are asked for."""
-        now = self._preview.change(self.speech(sound, line, take), self._asked(document, take))
+    def change(self, sound: Path, edits: Path | None, line: Line, take: Take) -> Previewed:
+        """A take as it stands; its parts are made when they are asked for. edits: a file of removed and drawn nodes."""
+        now = self._preview.change(self.speech(sound, line, take), self._asked(edits, take))
         self.generation += 1
         if self._shown != (line.name, take.name):
             self._shown, self._changes = (line.name, take.name), [(self.generation, 0.0, inf)]
@@ -96,10 +97,15 @@ class Performing:
         count = max(round(now.speech.duration_s * animation.fps), 1)
         return _rows(animation, min(round(start_s * animation.fps), count - 1), count)
 
-    def whole(self, sound: Path, document: Document, line: Line, take: Take) -> Shown:
+    def whole(self, sound: Path, edits: Path | None, line: Line, take: Take) -> Shown:
         """The whole face of a take."""
-        now = self.change(sound, document, line, take)
+        now = self.change(sound, edits, line, take)
         return self.stretch(now, 0.0, now.speech.duration_s)
+
+    def explanation(self, sound: Path, edits: Path | None, line: Line, take: Take) -> list[dict[str, Any]]:
+        """Why each phone got its motion, with what could stand there as well; FacesynthError where the model cannot tell."""
+        speech, request = self.speech(sound, line, take), self._asked(edits, take)
+        return require(self.model, Explaining).explain(speech, **self._preview.cast.options(request, speech.phones))
 
     def of_motion(self, motion: Motion, speech: Speech) -> Shown:
         """A recording on the head, gaps filled so that it can be looked at."""
@@ -115,11 +121,13 @@ class Performing:
         animation = self._preview.shown(animate(motion, stage.rig, head_gain=0.0, eyes=still_eyes))
         return _rows(animation, 0, len(animation))
 
-    def _asked(self, document: Document, take: Take) -> Request:
+    def _asked(self, edits: Path | None, take: Take) -> Request:
         """The same as for the files of the take, without the files."""
         own: dict[str, Any] = dict(own_options(take, self.model.capabilities))
         if take.pins and self.model.capabilities.option(PINS):
             own[PINS] = {pin.phone: pin.node for pin in take.pins}
+        if edits is not None and self.model.capabilities.option(NODES):
+            own[NODES] = edits
         return replace(self._request, own=own, **of_request(take))
 
 

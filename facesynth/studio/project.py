@@ -4,7 +4,7 @@
 - `journal.jsonl`: every change; replayed when the project is opened
 - `lines/NAME/NAME.wav`: the sound of a line
 - `lines/NAME/TAKE/`: `phones.TextGrid`, `emotions.csv`, `constraints.csv`, which `speak` takes; written after each change
-- `edits.jsonl`: nodes that were removed and drawn
+- `edits.jsonl`: nodes that were removed and drawn, after those edits that the corpus had (`corpus-edits.jsonl`)
 - `exports/`: what was exported
 """
 
@@ -23,11 +23,12 @@ from facesynth.corpus.files import check_id
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.speech.audio import as_saved, save_wav
 from facesynth.studio.commands import CHANGES, changed
-from facesynth.studio.document import Document, Line
+from facesynth.studio.document import Document, Drawn, Line
 from facesynth.studio.kept_changes import REDO, UNDO, Change, KeptChanges
-from facesynth.studio.speak_files import write_edits, write_take
+from facesynth.studio.speak_files import drawn_names, write_edits, write_take
 
 FORMAT = 1
+EDITS, BEFORE = "edits.jsonl", "corpus-edits.jsonl"
 NODES = "nodes"
 """In place of a line's name: the nodes that may be used."""
 
@@ -53,6 +54,7 @@ class Project:
         self.changed_at: dict[str, int] = {}
         """Revision at which each line, and NODES, changed last."""
         self._lock, self._journal = lock, journal
+        self._before = _lines(folder / BEFORE)
         self._past: list[Document] = []
         self._future: list[Document] = []
         for number, change in enumerate(changes, start=1):
@@ -74,6 +76,7 @@ class Project:
             raise FacesynthError(f"{folder} is open in another studio; close that one, or give another --project") from None
         try:
             _keep_facts(folder, corpus, model)
+            _keep_edits(folder, corpus)
             return cls(folder, lock, *KeptChanges.opened(folder / "journal.jsonl"))
         except BaseException:
             lock.release()
@@ -117,6 +120,16 @@ class Project:
     def take_folder(self, line: str, take: str) -> Path:
         """Where the files of a take are."""
         return self.folder / "lines" / check_id(line) / check_id(take)
+
+    @property
+    def edits(self) -> Path | None:
+        """The file of removed and drawn nodes; None where there are none."""
+        return self.folder / EDITS if self.document.removed or self.document.drawn else None
+
+    @property
+    def drawn(self) -> list[tuple[str, Drawn]]:
+        """The drawn nodes under the names by which they are constrained and removed."""
+        return list(zip(drawn_names(self.document, self._before), self.document.drawn, strict=True))
 
     def keep_sound(self, line: str, audio: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
         """Write a line's sound before the line is added; gives what will be read back. Another line's is refused."""
@@ -176,7 +189,7 @@ class Project:
             if line.name in kept.lines:
                 self._write_line(line)
         if kept.nodes:
-            write_edits(self.folder / "edits.jsonl", self.document)
+            write_edits(self.folder / EDITS, self.document, self._before)
 
     def _write_line(self, line: Line) -> None:
         for take in line.takes:
@@ -187,7 +200,7 @@ class Project:
             if not self.sound(line.name).is_file():
                 raise FacesynthError(f"{self.sound(line.name)} is missing; restore it from a copy")
             self._write_line(line)
-        write_edits(self.folder / "edits.jsonl", self.document)
+        write_edits(self.folder / EDITS, self.document, self._before)
 
 
 def read_facts(folder: Path) -> dict[str, str]:
@@ -211,6 +224,17 @@ def _keep_facts(folder: Path, corpus: Path | None, model: Path | None) -> None:
     given = {"corpus": str(corpus or known.get("corpus", "")), "model": str(model or known.get("model", ""))}
     if given != known:
         write_text(folder / "project.json", json.dumps({"format": FORMAT, **given}, indent=1) + "\n")
+
+
+def _keep_edits(folder: Path, corpus: Path | None) -> None:
+    """Keep the edits that the corpus has when a project begins: drawn nodes are called by the line that adds them."""
+    there = corpus / EDITS if corpus else None
+    if not (folder / "journal.jsonl").exists() and there is not None and there.is_file():
+        write_text(folder / BEFORE, "".join(line + "\n" for line in _lines(there)))
+
+
+def _lines(path: Path) -> tuple[str, ...]:
+    return tuple(path.read_text(encoding="utf-8").splitlines()) if path.is_file() else ()
 
 
 def _differing(before: Document, after: Document) -> tuple[str, ...]:

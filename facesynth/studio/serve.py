@@ -81,6 +81,7 @@ def _listening(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((HOST, port))
+        listening.listen()  # a browser that is quicker than the server waits in line
     except OSError as error:
         listening.close()
         raise FacesynthError(f"port {port} cannot be used ({error.strerror}); give another --port, or none") from None

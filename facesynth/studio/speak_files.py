@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.atomic import write_text
-from facesynth.corpus.journal import parse_node
+from facesynth.corpus.journal import ADDED, node_name, parse_node
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.capabilities import Capabilities
 from facesynth.speech.emotions import write_emotions
@@ -30,11 +30,20 @@ def write_take(folder: Path, take: Take) -> None:
     write_text(folder / CONSTRAINTS, _constraints(take))
 
 
-def write_edits(path: Path, document: Document) -> None:
-    """Write which nodes were drawn and removed, as a corpus keeps its edits."""
-    drawn = [{"op": "add", "phone": node.phone, "emotion": node.emotion, "frames": node.frames} for node in document.drawn]
+def write_edits(path: Path, document: Document, before: Sequence[str]) -> None:
+    """Write which nodes were drawn and removed as a corpus keeps its edits, after those that the corpus had (`before`)."""
+    drawn = [
+        {"op": "add", "phone": node.phone, "emotion": node.emotion, "title": node.title, "frames": node.frames}
+        for node in document.drawn
+    ]
     removed = [{"op": "remove", "node": node} for node in document.removed]
-    write_text(path, "".join(json.dumps(edit, ensure_ascii=False) + "\n" for edit in [*drawn, *removed]))
+    lines = [*before, *(json.dumps(edit, ensure_ascii=False) for edit in [*drawn, *removed])]
+    write_text(path, "".join(line + "\n" for line in lines))
+
+
+def drawn_names(document: Document, before: Sequence[str]) -> list[str]:
+    """What a journal of edits calls the drawn nodes: by the lines that add them."""
+    return [node_name(ADDED, len(before) + number) for number in range(1, len(document.drawn) + 1)]
 
 
 def own_options(take: Take, model: Capabilities) -> dict[str, Any]:

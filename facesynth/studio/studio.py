@@ -97,10 +97,18 @@ class Studio:
 
     async def show(self, line: str, take: str) -> Shown:
         """The whole face of a take as it is."""
-        document = self.project.document
-        found = document.line(line)
+        found = self.project.document.line(line)
         work = self.require_performing().whole
-        return await self.away(work, self.project.sound(line), document, found, found.take(take))
+        return await self.away(work, self.project.sound(line), self.project.edits, found, found.take(take))
+
+    async def next_best(self, line: str, take: str, phone: int) -> list[dict[str, Any]]:
+        """Nodes that could stand at a phone, and what the whole would cost more."""
+        found = self.project.document.line(line)
+        work = self.require_performing().explanation
+        rows = await self.away(work, self.project.sound(line), self.project.edits, found, found.take(take))
+        if not 0 <= phone < len(rows):
+            raise FacesynthError(f"there is no phone {phone}; the take has 0 to {len(rows) - 1}")
+        return list(rows[phone].get("runners_up", []))
 
     async def show_recording(self, utterance: str) -> Shown:
         """The motion that was recorded with an utterance, on the head."""
@@ -135,9 +143,7 @@ class Studio:
         if not suffixes or not set(suffixes) <= set(OUTPUTS):
             raise FacesynthError(f"what can be exported is {', '.join(OUTPUTS)}; got {', '.join(suffixes) or 'nothing'}")
         said = self.project.document.line(line).take(take)
-        edited = bool(self.project.document.removed or self.project.document.drawn)
-        edits = folder / "edits.jsonl" if edited else None
-        request = request_of(said, self.project.take_folder(line, take), edits, performing.model.capabilities)
+        request = request_of(said, self.project.take_folder(line, take), self.project.edits, performing.model.capabilities)
         outputs = [folder / "exports" / f"{line}-{take}{suffix}" for suffix in suffixes]
         words = arguments(self._model_path(), self.project.sound(line), request, said, outputs)
         return self.jobs.start(f"export {line}, take {take}", words)

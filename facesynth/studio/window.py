@@ -133,7 +133,7 @@ class SocketWindow:
         take, sound = line.take(wanted.take), studio.project.sound(wanted.line)
         about = {"line": wanted.line, "take": wanted.take, "number": wanted.number, "trial": wanted.trial is not None}
         about["revision"] = studio.project.revision
-        now = await studio.away(performing.change, sound, document, line, take)
+        now = await studio.away(performing.change, sound, studio.project.edits, line, take)
         pieces = self._fresh.setdefault((performing, wanted.line, wanted.take), {})
         order = near_first(now.speech.duration_s, wanted.at_s, wanted.sight_s)
         batches = [batch for batch in order if any(performing.stale(pieces.get(k, 0), k, k + 1) for k in batch)] or order[:1]
@@ -161,6 +161,10 @@ class SocketWindow:
         self._shown = _wanted(message, None)
         self._studio.project.document.line(self._shown.line).take(self._shown.take)
         self._want(self._shown)
+
+    async def _op_next_best(self, message: dict[str, Any]) -> dict[str, Any]:
+        rows = await self._studio.next_best(str(message["line"]), str(message["take"]), int(message["phone"]))
+        return {"rows": rows}
 
     async def _op_compare(self, message: dict[str, Any]) -> None:
         """Another take, as a ghost."""

@@ -2,16 +2,31 @@
 
 import csv
 import shlex
+import shutil
 import subprocess
 import sys
+import tarfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
+import torch
 from browsing import Page, browser, started
 from corpora import tiny_corpus
+from serving import TOKEN, Served
 
+from facesynth.atomic import write_text
+from facesynth.cache import cache_dir
+from facesynth.inference.motion import Motion
+from facesynth.methods.capabilities import Capabilities, Option
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+from facesynth.studio.performing import Performing
+from facesynth.studio.serve import head_file
 
+AXE = "4.14.1"
 SIZE = "128x96"
 
 
@@ -31,7 +46,7 @@ def test_the_whole_way_by_mouse_and_keyboard(shop, tmp_path):
         load_a_line(page)
         move_a_boundary(page)
         half_angry(page)
-        keep_and_remove_nodes(page)
+        constrain_from_the_map(page)
         undo_and_redo(page)
         command, exported = export(page, project)
         assert page.errors == []
@@ -71,14 +86,24 @@ def half_angry(page):
     page.until_settled()
 
 
-def keep_and_remove_nodes(page):
-    """One click keeps what the search chose."""
-    page.page.mouse.click(*page.place(sum(row[1] for row in page.take()["phones"][2:4]) / 2, "phones"))
-    page.page.click("#show-phone")
-    page.until("Boolean(document.getElementById('pin-chosen'))")
-    page.after(lambda: page.page.click("#pin-chosen"))
-    assert len(page.take()["pins"]) == 1
+def constrain_from_the_map(page):
+    """With the mouse: hovering shows the pose, a click plays the node, a drag onto the timeline constrains it there."""
+    phones = page.take()["phones"]
+    middle_s = sum(row[1] for row in phones[2:4]) / 2
+    page.page.mouse.click(*page.place(middle_s, "phones"))
+    page.until(f"facesynth.map.state().map?.phone === '{phones[3][0]}' && facesynth.map.state().marks !== null")
+    used = page.see("facesynth.store.choices[3].node")
+    node = next(one for one in page.see("facesynth.map.state().map.nodes") if one != used)
+    start = page.see(f"facesynth.map.placeOf('{node}')")
+    page.page.mouse.move(*start)
+    page.until("facesynth.store.picked !== null && facesynth.map.picks.took.length > 0")
+    page.page.mouse.click(*start)
+    page.until("facesynth.map.state().chosen !== null")
+    node = page.see("facesynth.map.state().chosen")
+    page.after(lambda: page.drag(start, page.place(middle_s, "nodes")))
+    assert page.take()["pins"] == [[3, node]]
     page.until_settled()
+    assert page.see("facesynth.store.choices[3].node") == node
 
 
 def undo_and_redo(page):
@@ -122,3 +147,112 @@ def assert_command_line_makes_the_same(command, exported, folder):
         assert path.read_bytes() == Path(again[str(path)]).read_bytes()
     with open(again[str(exported[0].with_suffix(".csv"))], newline="", encoding="utf-8") as file:
         assert len(list(csv.reader(file))) > 20
+
+
+WOBBLE = Capabilities(
+    "studio_wobble",
+    "for this test",
+    options=(Option("wobble", float, "How much it wobbles.", 0.0, 2.0), Option("backwards", bool, "Whether it plays backwards.")),
+)
+
+
+@register(WOBBLE)
+class Wobble(Method):
+    """A method that the studio has never heard of."""
+
+    def fit(self, corpus, *, seed=0):
+        self.learned_from(corpus)
+        self.register_buffer("rest", torch.tensor(corpus.layout.neutral))
+        return self.eval()
+
+    def synthesize(self, speech, *, seed=0, wobble=0.0, backwards=False):
+        count = int(speech.phones.frame_bounds(self.fps)[-1])
+        jaw = wobble * np.sin(np.arange(count) / 5) ** 2
+        frames = np.tile(self.rest.numpy(), (count, 1))
+        frames[:, self.layout.columns("jaw")[1]] -= 12 * jaw
+        return Motion(frames, self.fps, self.layout)
+
+
+def test_a_method_that_states_its_options_shows_up_with_them(tiny, tmp_path, rig):
+    performing = Performing.of(Wobble().fit(tiny))
+    head = head_file(tmp_path, performing).read_bytes()
+    served = Served(tmp_path / "served", tiny.path, performing, head)
+    try:
+        with browser() as launched:
+            page = Page(launched, f"http://{served.host}/?token={TOKEN}")
+            page.until("facesynth.store.motion !== null")
+            still = page.see("Array.from(facesynth.store.motion.rows)")
+            page.page.click("#show-options")
+            assert "How much it wobbles" in page.page.inner_text("#inspector")
+            assert page.page.is_visible("#option-backwards")
+            page.page.fill("#option-wobble", "1.5")
+            page.after(lambda: page.page.keyboard.press("Enter"))
+            page.until("facesynth.store.shownRevision === facesynth.store.project.revision")
+            assert page.see("Array.from(facesynth.store.motion.rows)") != still
+            page.page.click("#show-phone")
+            assert "does not tell what it chose" in page.page.inner_text("#inspector")
+            assert page.page.is_disabled("#map-phone")
+            assert page.errors == []
+    finally:
+        served.close()
+
+
+def test_nothing_serious_for_people_who_cannot_see_or_use_a_mouse(shop, tmp_path):
+    """axe-core finds nothing serious on any page, and everything that a mouse does can be reached by Tab."""
+    axe = axe_core()
+    with started(shop / "actor", shop / "model.safetensors", "--project", tmp_path / "p") as address, browser() as launched:
+        page = Page(launched, address, reduced_motion="reduce")
+        load_a_line(page)
+        for tab in ("phone", "emotion", "table", "nodes", "options"):
+            page.page.click(f"#show-{tab}")
+            assert serious(page, axe) == []
+        for button in ("new-line", "export"):
+            page.page.click(f"#{button}")
+            assert serious(page, axe) == []
+            page.page.keyboard.press("Escape")
+        reached = tabbed_through(page)
+        assert {
+            "line",
+            "undo",
+            "play",
+            "export",
+            "face-canvas",
+            "map-canvas",
+            "timeline-canvas",
+            "curve",
+            "option-seed",
+        } <= reached
+        page.page.click("#tab-corpus")
+        assert serious(page, axe) == []
+
+
+def tabbed_through(page):
+    """Ids of everything that Tab reaches from the top of the page."""
+    page.page.evaluate("document.activeElement?.blur()")
+    reached = []
+    for _ in range(120):
+        page.page.keyboard.press("Tab")
+        reached.append(page.see("document.activeElement.id"))
+    return set(reached)
+
+
+def serious(page, axe):
+    page.page.evaluate(axe)
+    found = page.see("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+    return [(one["id"], one["nodes"][0]["target"]) for one in found if one["impact"] in ("serious", "critical")]
+
+
+def axe_core():
+    """axe-core from npm, kept in the user's cache; a skip where it is not there and cannot be fetched."""
+    kept = cache_dir("tests") / f"axe-core-{AXE}.js"
+    if not kept.exists():
+        npm = shutil.which("npm")
+        if npm is None:
+            pytest.skip("axe-core is fetched by npm, which is not installed")
+        with TemporaryDirectory() as folder:
+            done = subprocess.run([npm, "pack", f"axe-core@{AXE}"], cwd=folder, capture_output=True, timeout=120, check=False)
+            if done.returncode:
+                pytest.skip("axe-core cannot be fetched from npm")
+            with tarfile.open(next(Path(folder).glob("*.tgz"))) as packed:
+                write_text(kept, packed.extractfile("package/axe.min.js").read().decode())
+    return kept.read_text(encoding="utf-8")

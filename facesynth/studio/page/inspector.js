@@ -1,6 +1,7 @@
 // What is chosen, in words and numbers: everything that the canvases do can be done here with the keyboard.
 
-import { store, watch, changed, currentTake, change, changeTake, startOf, regionStart } from "/page/store.js";
+import { store, watch, changed, currentTake, change, changeTake, startOf, regionStart, say } from "/page/store.js";
+import { ask } from "/page/link.js";
 import * as sound from "/page/sound.js";
 import { make, labelled, choice, refill } from "/page/dom.js";
 import { qualityOf } from "/page/lanes.js";
@@ -82,7 +83,10 @@ function nodeRows(k, row, pin) {
         : make("button", { id: "pin-chosen", textContent: "Keep this node", onclick: () => changeTake("pin", { phone: k, node: row.node }) }),
       removeButton(row.node)));
   }
-  if (row.runners_up?.length) rows.push(make("h3", { textContent: "Next best" }), runnersUp(k, row));
+  const found = store.runners?.key === runnersKey(k) ? store.runners.rows : null;
+  rows.push(make("div", { className: "row" }, make("h3", { textContent: "Next best" }),
+    found ? null : make("button", { id: "next-best", textContent: "Show", onclick: () => askRunners(k) })));
+  if (found) rows.push(runnersUp(k, found));
   return rows;
 }
 
@@ -91,8 +95,21 @@ function removeButton(node) {
   return make("button", { id: "remove-node", textContent: "Remove this node", onclick: () => change("remove_node", { node }, `${node} is not used any more`) });
 }
 
-function runnersUp(k, row) {
-  const body = row.runners_up.map(({ node, extra_cost }) =>
+const runnersKey = (k) => [store.line, store.take, k, store.project.revision].join("\n");
+
+async function askRunners(k) {
+  const key = runnersKey(k);
+  try {
+    const { rows } = await ask("next_best", { line: store.line, take: store.take, phone: k });
+    store.runners = { key, rows };
+    show();
+  } catch (error) {
+    say(error.message, true);
+  }
+}
+
+function runnersUp(k, found) {
+  const body = found.map(({ node, extra_cost }) =>
     make("tr", {}, make("td", {}, make("code", { textContent: node })), make("td", { textContent: `costs ${extra_cost.toFixed(2)} more` }),
       make("td", {}, store.model.pins ? make("button", { textContent: "Use", "aria-label": `Use ${node}`, onclick: () => changeTake("pin", { phone: k, node }) }) : "")));
   return make("table", {}, make("tbody", {}, ...body));
@@ -178,7 +195,9 @@ function showNodes() {
   const gone = removed.map((node) => make("div", { className: "row" }, make("code", { textContent: node }),
     make("button", { textContent: "Restore", "aria-label": `Restore ${node}`, onclick: () => change("restore_node", { node }, `${node} may be used again`) })));
   const made = drawn.map(({ title, phone, emotion, frames, node }) => make("div", { className: "row" }, make("strong", { textContent: title || "untitled" }),
-    make("code", { textContent: node ?? "" }), make("span", { textContent: `${phone}, ${emotion}, ${frames} frames` })));
+    make("code", { textContent: node }), make("span", { textContent: `${phone}, ${emotion}, ${frames} frames` }),
+    removed.includes(node) ? null : make("button", { textContent: `Use at phone ${store.phone}`, "aria-label": `Use ${node} at phone ${store.phone}`, onclick: () => changeTake("pin", { phone: store.phone, node }, `${node} is used`) }),
+    removed.includes(node) ? null : make("button", { textContent: "Remove", "aria-label": `Remove ${node}`, onclick: () => change("remove_node", { node }) })));
   const none = make("p", { className: "note", textContent: store.model?.edits ? "none" : "This model takes no edits of its nodes." });
   return [make("h3", { textContent: "Removed nodes" }), ...(gone.length ? gone : [none]), make("h3", { textContent: "Drawn nodes" }), ...(made.length ? made : [none.cloneNode(true)])];
 }

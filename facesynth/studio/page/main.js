@@ -11,10 +11,10 @@ import * as recording from "/page/recording.js";
 import * as exporting from "/page/export.js";
 import * as corpus from "/page/corpus.js";
 import { all as wholeLine } from "/page/view.js";
+import { measured, faceCame, timed, next } from "/page/measure.js";
 
 const byId = (id) => document.getElementById(id);
 let face = null;
-const measured = { trials: [], ready: false };
 
 async function begin() {
   reportTo((text, bad) => {
@@ -74,11 +74,7 @@ function heardFace(message) {
   const motion = motionOf(message, store.motion);
   store.motion = motion;
   if (!message.trial && message.last) settle(message.revision);
-  const asked = timeline.trials.asked.get(message.number);
-  if (message.trial && asked) {
-    timeline.trials.asked.delete(message.number);
-    requestAnimationFrame(() => measured.trials.push(performance.now() - asked));
-  }
+  faceCame(message);
   changed("motion");
 }
 
@@ -117,6 +113,7 @@ function run() {
     run.going = sound.playing();
     if (!run.going) return;
     byId("clock").textContent = `${sound.time().toFixed(3)} s`;
+    sound.compare();
     pose();
     recording.follow();
     timeline.draw();
@@ -227,6 +224,11 @@ function keys() {
   });
 }
 
-// For benchmarks and tests, which look and do not touch.
-window.facesynth = { store, measured, sound, timeline, map, get face() { return face; } };
+// For benchmarks and tests.
+window.facesynth = {
+  store, measured, sound, timeline, map,
+  get face() { return face; },
+  timed: (name, facts) => timed(store.project.revision, name, facts),
+  next: (phone) => next(store.line, store.take, phone),
+};
 begin().catch((error) => say(`the page cannot begin: ${error.message}`, true));

@@ -21,6 +21,17 @@ export function time() {
   return Math.max(0, Math.min(at, duration()));
 }
 
+export const apart = []; // seconds between what is shown and what is heard, picture by picture: for the benchmark
+
+/** Compare the playhead with what the sound card says that it plays. */
+export function compare() {
+  const { contextTime, performanceTime } = context.getOutputTimestamp();
+  if (!source || loop.on || !contextTime) return;
+  const heard = contextTime + (performance.now() - performanceTime) / 1000 - began;
+  apart.push(time() - heard);
+  if (apart.length > 100000) apart.length = 0;
+}
+
 export const playing = () => source !== null;
 
 /** Load the sound at an address, once. */

@@ -3,6 +3,7 @@
 import { ask, lastNumber } from "/page/link.js";
 import { store, watch, changed, currentTake, changeTake, startOf, indexAt, duration, seen, sightFrom, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
+import { trialAsked } from "/page/measure.js";
 import { view, x, at, all, zoom, scroll, follow, snapped } from "/page/view.js";
 import * as lanes from "/page/lanes.js";
 
@@ -12,7 +13,7 @@ const curve = document.getElementById("curve");
 let layout = lanes.lanesOf(200);
 let drag = null;
 let wanted = false;
-export const counted = { drawn: 0 };
+export const counted = { drawn: 0, took: [] }; // for the benchmark
 
 export function begin() {
   sightFrom(() => ({ at: sound.time(), from: view.start, to: view.end }));
@@ -68,7 +69,10 @@ export function draw() {
   wanted = true;
   requestAnimationFrame(() => {
     wanted = false;
+    const begun = performance.now();
     paint();
+    counted.took.push(performance.now() - begun);
+    if (counted.took.length > 1000) counted.took.length = 0;
   });
 }
 
@@ -191,8 +195,6 @@ function preview(take, name, facts) {
 
 let trying = false;
 let nextTrial = null;
-export const trials = { asked: new Map() }; // when each was asked for, by number: for the benchmark
-
 /** Let the face follow a drag: the newest place alone is asked for. */
 async function trial(name, facts) {
   nextTrial = [name, facts];
@@ -202,7 +204,7 @@ async function trial(name, facts) {
     const [doing, said] = nextTrial;
     nextTrial = null;
     const answer = ask("trial", { line: store.line, take: store.take, do: doing, with: { line: store.line, take: store.take, ...said }, ...seen() });
-    trials.asked.set(lastNumber(), performance.now());
+    trialAsked(lastNumber());
     await answer.catch((error) => say(error.message, true));
   }
   trying = false;
