@@ -47,14 +47,14 @@ def bars_figure(bars: Mapping[str, float], xlabel: str) -> str:
 
 def tracks_figure(fps: float, panels: Mapping[str, Mapping[str, Array]], longest_s: float = 15.0) -> str:
     """By the title of a panel, with its unit: signals [T] by label, over time; no more than so many seconds."""
-    figure, axes = new_figure(10, 0.6 + 1.5 * len(panels), len(panels), 1, sharex=True)
+    figure, axes = new_figure(10, 0.6 + 1.7 * len(panels), len(panels), 1, sharex=True)
     labels = list(dict.fromkeys(label for tracks in panels.values() for label in tracks if label != RECORDED))
     colours = {RECORDED: "black", **colour_of(labels)}
     for axis, (title, tracks) in zip(axes[:, 0], panels.items(), strict=True):
         for label, track in sorted(tracks.items(), key=lambda pair: pair[0] != RECORDED):
             shown = track[: round(longest_s * fps)]
             axis.plot(np.arange(len(shown)) / fps, shown, color=colours[label], label=label, linewidth=1)
-        axis.set_ylabel(title, fontsize=8)
+        axis.set_title(title, fontsize=8, loc="left")
     axes[-1, 0].set(xlabel="s")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), **SMALL, ncols=4, loc="outside upper center")
     return as_uri(figure)
