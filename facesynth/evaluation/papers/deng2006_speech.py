@@ -46,7 +46,9 @@ def fitting_costs(corpus: Corpus) -> dict[tuple[float, int], float]:
     tracks = [track_of((u.motion.frames.astype(np.float64) - rest) @ basis, u.speech.phones, corpus.fps) for u in chosen]
     kinds = [transitions_of(tracks, over, 0.0) for over in (2, 3)]
     frames = sum(len(kind.times) for kind in kinds)
-    return {(p, n): fitting_cost(kinds, n, p) / max(frames, 1) for p, n in product(PENALTIES, DEGREES)}
+    if not frames:
+        raise FacesynthError(f"in {corpus.path} no phone follows another")
+    return {(p, n): fitting_cost(kinds, n, p) / frames for p, n in product(PENALTIES, DEGREES)}
 
 
 def shown_trajectories(material: Material) -> list[Finding]:
