@@ -14,6 +14,7 @@ from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixa
 from facesynth.evaluation.head_statistics import HeadSample, take_apart
 from facesynth.evaluation.table import Column
 from facesynth.inference.motion import Motion
+from facesynth.methods.capabilities import Part
 from facesynth.motion.lids import opening_of, shut_level
 
 HEAD = {
@@ -53,12 +54,12 @@ class PartSums:
     """(made, recorded)"""
     eyes: list[tuple[Motion, Motion]] = field(default_factory=list)
 
-    def add(self, utterance: Utterance, made: Motion) -> None:
-        """Take one utterance in."""
+    def add(self, utterance: Utterance, made: Motion, part: Part = "mouth") -> None:
+        """Take in one utterance of a method that moves a part, a mouth moving the others too."""
         recorded = utterance.motion
-        if _known(made.head, recorded.head):
+        if part != "eyes" and _known(made.head, recorded.head):
             self.heads.append((take_apart(made, utterance.speech), take_apart(recorded, utterance.speech)))
-        if _known(made.eyes, recorded.eyes):
+        if part != "head" and _known(made.eyes, recorded.eyes):
             self.eyes.append((made, recorded))
 
     def figures(self) -> dict[str, float]:

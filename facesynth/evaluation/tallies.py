@@ -8,9 +8,9 @@ from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.details import Details, DetailSums
 from facesynth.evaluation.dynamics import join_jump
-from facesynth.evaluation.judge import APART, NAN, Judge, Tally
+from facesynth.evaluation.judge import APART, NAN, Judge, Tally, moves_alone
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.evaluation.part_statistics import PartSums
+from facesynth.evaluation.part_statistics import PART_COLUMNS, PartSums
 from facesynth.evaluation.predictions import Beside, load_prediction, read_beside, sample_paths
 from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Row
@@ -58,7 +58,7 @@ def tally(task: Task) -> Judged:
             continue
         utterance = corpus[utterance_id]
         figures.add(task.judges[utterance_id], utterance, motion, task.part)
-        parts.add(utterance, motion)
+        parts.add(utterance, motion, task.part)
         if task.part not in APART:
             sums.add(utterance, motion)
         if task.label == SECOND_TAKE:
@@ -70,7 +70,10 @@ def tally(task: Task) -> Judged:
             _add_own(figures, beside, motion)
             spent.append(beside)
     figures.explain(VARIETY, "no other motion of the same speech: the method draws none, or none lies beside the predictions")
-    return Judged(figures.row(task.label, {}), sums.details(), _rates(spent) | parts.figures())
+    moved = parts.figures()
+    alone = moves_alone(task.part) if task.part in APART else "the method moves neither head nor eyes, or nobody recorded them"
+    figures.reasons |= {column.name: alone for column in PART_COLUMNS if column.name not in moved}
+    return Judged(figures.row(task.label, {}), sums.details(), _rates(spent) | moved)
 
 
 def read_motion(corpus: Corpus, predictions: Path, label: str, utterance_id: str) -> Motion | None:

@@ -31,6 +31,9 @@ def test_what_moves_as_recorded_is_nought_apart_and_what_rests_is_one(tmp_path):
     rests = still.figures()
     assert rests["head_speed"] == rests["head_range"] == rests["gaze_speed"] == 1.0
     assert PartSums().figures() == {}
+    alone = PartSums()
+    alone.add(seen, seen.motion, "eyes")
+    assert set(alone.figures()) <= set(EYES.values())
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +53,7 @@ def test_heads_are_judged_as_heads_and_mouths_as_mouths(compared):
     assert not scores["head_ridge"]["marker_error"].utterances
     assert rows["head_ridge"].reasons["marker_error"] == "the method moves the head alone"
     assert scores["mean face"]["marker_error"].utterances == 6
+    assert rows["mean face"].reasons["head_speed"].startswith("the method moves neither head nor eyes")
     assert verdicts(result) == []
     assert not scores["mean face"]["head_speed"].utterances
     assert {"head_cca", "head_speed", "head_spectrum", "marker_error"} <= set(result.main_columns())

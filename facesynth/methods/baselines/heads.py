@@ -90,7 +90,7 @@ class HeadRidge(Method):
 
 def _heard(speech: Speech, fps: float, count: int) -> Floats:
     """[T, 54] prosody around each frame."""
-    prosody = prosody_of(prosody_windows(speech, fps, count), fps)
+    prosody = prosody_of([prosody_windows(speech, fps, count)], fps)
     prosody = prosody * np.repeat([1.0, 1 / fps / DIFFERENCE_S, (1 / fps / DIFFERENCE_S) ** 2], 2)
     at = np.arange(len(prosody))[:, None] + np.round(AROUND_S * fps).astype(np.int64)
     return prosody[np.clip(at, 0, len(prosody) - 1)].reshape(len(prosody), -1)
