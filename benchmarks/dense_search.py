@@ -7,8 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.efase.costs import Weights
-from facesynth.inference.efase.nodes import Floats, Ints, Nodes
+from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.steps import end_vectors, start_vectors
 from facesynth.inference.warp import stretched
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from facesynth.capture.kept_tracks import kept_track
 from facesynth.capture.landmarks import LIP_PAIRS, RIGID
+from facesynth.capture.motion import steadied
 from facesynth.capture.shape import in_mm
-from facesynth.capture.steady import steadied
 from facesynth.capture.track import Track
 from facesynth.corpus import Corpus
 from facesynth.corpus.add.recordings import VIDEO

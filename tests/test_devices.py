@@ -238,5 +238,27 @@ def test_train_says_in_one_line_that_a_device_is_not_there(tiny, tmp_path, monke
     assert run("mean_face", tiny.path, "-o", model, "--config", tmp_path / "there.yaml").exit_code == 0
 
 
+def test_every_script_that_trains_takes_a_device(repository):
+    scripts = [path for path in (repository / "train").glob("*.py") if "add_argument" in path.read_text(encoding="utf-8")]
+    assert len(scripts) > 8
+    for path in scripts:
+        assert '"--device"' in path.read_text(encoding="utf-8"), path.name
+
+
+def test_the_means_of_a_soft_path_are_the_same_on_a_second_device(tiny):
+    """A search by tensors there, by numpy here."""
+    soft = registry.create("efase", temperature=0.5, candidates=12).fit(tiny)
+    speech = tiny[tiny.ids[0]].speech
+    wanted = soft.plan(speech).mixtures
+    with second_device():
+        found = copy.deepcopy(soft).to(DEVICE).plan(speech).mixtures
+    for here, there in zip(wanted, found, strict=True):
+        assert (here is None) == (there is None)
+        if here is not None:
+            np.testing.assert_array_equal(there.nodes, here.nodes)
+            np.testing.assert_allclose(there.shares, here.shares, atol=1e-9)
+            np.testing.assert_allclose(there.captured, here.captured, atol=1e-9)
+
+
 def run(*arguments):
     return CliRunner().invoke(train, [str(argument) for argument in arguments], catch_exceptions=False)

@@ -126,7 +126,7 @@ def test_scripts_import_what_they_may(repository, folder, rooms):
     assert scripts
     for path in scripts:
         for module, names in imports(path):
-            known = module[1] in rooms or (folder == "train" and module[1] in ("config", "progress"))
+            known = module[1] in rooms or (folder == "train" and module[1] in ("config", "device", "progress"))
             assert known, f"{folder}/{path.name} imports {'.'.join(module)}"
             assert not any(name.startswith("_") for name in names), f"{folder}/{path.name}: {names}"
 

@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit: key shapes of phones, and polynomials of the time by viseme class.
-    model = learn(Coarticulation, train, load_config(options.config), seed=options.seed)
+    model = learn(Coarticulation, train, load_config(options.config), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate.
@@ -82,6 +82,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--config", type=Path, default=CONFIG)
     parser.add_argument("-o", "--output", type=Path, default=Path("coarticulation.safetensors"))
     parser.add_argument("--common", type=Path, help="YAML file to write the polynomials of all pairs to")
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

@@ -24,6 +24,7 @@ def main() -> None:
     parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
     parser.add_argument("-o", "--output", type=Path, default=Path("efase.safetensors"))
     parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "efase.yaml")
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_intermixed_args()
 
@@ -33,7 +34,7 @@ def main() -> None:
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = train(Efase, recorded, settings, seed=options.seed)
+    model = train(Efase, recorded, settings, seed=options.seed, device=options.device)
     if told := model.facts.get("learned"):
         print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
         print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))

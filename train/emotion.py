@@ -10,6 +10,7 @@ from pathlib import Path
 
 from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
+from facesynth.device import device_of
 from facesynth.methods.emotion.clips import clips_of_corpus, clips_of_list
 from facesynth.methods.emotion.detector import DetectorSettings, EmotionDetector
 from facesynth.methods.emotion.tables import SPLITS, Recognition, recognise, table_one
@@ -21,6 +22,7 @@ def main() -> None:
     parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
     parser.add_argument("-o", "--output", type=Path, default=Path("emotion.safetensors"))
     parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "emotion.yaml")
+    parser.add_argument("--device", default="cpu", help="where the voices' features are computed: auto, cpu, cuda or mps")
     parser.add_argument("--table", action="store_true", help="reproduce Table I in form")
     options = parser.parse_intermixed_args()
 
@@ -30,7 +32,7 @@ def main() -> None:
     settings = DetectorSettings.from_config({**load_config(options.config), **parse_settings(options.settings)})
 
     # evaluate
-    detector = EmotionDetector(settings)
+    detector = EmotionDetector(settings).to(device_of(options.device))
     features = detector.features_of(clips)
     splits = [s for s in SPLITS if s != "by speaker" or len({c.speaker for c in clips}) > 1]
     splits = [s for s in splits if s != "by sentence" or len({c.sentence for c in clips}) > 1]

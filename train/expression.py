@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit: differences of twins, their eigenspace, the signals in it.
-    model = learn(Expression, train, load_config(options.config), seed=options.seed)
+    model = learn(Expression, train, load_config(options.config), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate: a recorded neutral sentence with the emotion added, against the recorded emotional one at the same timing.
@@ -66,6 +66,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--config", type=Path, default=CONFIG)
     parser.add_argument("-o", "--output", type=Path, default=Path("expression.safetensors"))
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

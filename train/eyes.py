@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from facesynth.config import load_config, parse_settings
 from facesynth.corpus import Corpus
 from facesynth.corpus.eyes import recorded_eyes
+from facesynth.device import device_of
 from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixation_statistics, pooled
-from facesynth.inference.eyes import Floats
+from facesynth.inference.arrays import Floats
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.recordings import whole_pieces
 from facesynth.motion.lids import eyes_of, opening_of
@@ -36,6 +37,7 @@ def main() -> None:
     parser.add_argument("--lids", type=Path)
     parser.add_argument("-o", "--output", type=Path, default=Path("eyes.safetensors"))
     parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "eyes.yaml")
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_intermixed_args()
 
@@ -45,7 +47,8 @@ def main() -> None:
     settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = Eyes.from_config(settings).fit(recorded, seed=options.seed, lids=lids)
+    place = device_of(options.device or settings.get("device", "cpu"))
+    model = Eyes.from_config(settings).to(place).fit(recorded, seed=options.seed, lids=lids)
     print(", ".join(f"{name} {value}" for name, value in model.facts.items()))
 
     # evaluate: Kolmogorov-Smirnov distances, for heads that move as those of the recordings do

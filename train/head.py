@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     # Fit.
     config = load_config(options.config or CONFIGS / f"{options.method}.yaml")
-    model = learn(method_class(options.method), train, config, seed=options.seed)
+    model = learn(method_class(options.method), train, config, seed=options.seed, device=options.device)
     print(", ".join(f"{name} {value}" for name, value in model.facts.items()))
 
     # Evaluate: head rotation against the recorded one, beside a head that stays where it usually is.
@@ -62,6 +62,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--method", choices=("head_knn", "head_hmm"), default="head_hmm")
     parser.add_argument("--config", type=Path)
     parser.add_argument("-o", "--output", type=Path, default=Path("head.safetensors"))
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit. The order and the lead are chosen on the training sentences alone.
-    model = learn(LDS, train, load_config(options.config), seed=options.seed)
+    model = learn(LDS, train, load_config(options.config), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate: the deterministic part, samples with noise, and the mean pose of the training sentences.
@@ -79,6 +79,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--config", type=Path, default=CONFIG)
     parser.add_argument("-o", "--output", type=Path, default=Path("lds.safetensors"))
     parser.add_argument("--plots", type=Path, help="folder for plots of what was identified")
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(arguments)
 

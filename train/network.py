@@ -18,6 +18,7 @@ import torch
 from torch import nn
 
 from facesynth.corpus import Corpus
+from facesynth.device import device_of
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
 from facesynth.methods.learn.expectation import LARGEST_GRADIENT, STEPS, average, learning
@@ -32,12 +33,14 @@ def main() -> None:
     parser.add_argument("corpus", type=Path)
     parser.add_argument("-o", "--output", type=Path, default=Path("network.safetensors"))
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--device", default="auto", help="auto, cpu, cuda or mps")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
 
     # load
     recorded, held_out = Corpus.open(options.corpus).split(options.seed)
-    model = Network(steps=options.steps)
+    device = device_of(options.device)
+    model = Network(steps=options.steps).to(device)
     model.learned_from(recorded)
     predictor = model.predictor
 
@@ -53,7 +56,7 @@ def main() -> None:
     network.train()
     torch.manual_seed(options.seed)
     for step in range(options.steps):
-        batch = windows.draw(rng)
+        batch = windows.draw(rng).to(device)
         poses, log_deviations = network(batch.told)
         loss = loss_of(poses, log_deviations, batch)
         optimiser.zero_grad()

@@ -20,6 +20,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.head_hmm.method import HeadHmmMethod
 from facesynth.methods.learn.heads import poses_of
+from facesynth.methods.training import train
 from facesynth.motion.resample import resample
 
 CONFIG = Path(__file__).parents[1] / "configs" / "head_hmm.yaml"
@@ -40,7 +41,7 @@ def main(arguments: list[str] | None = None) -> None:
                 add_parts(together, f"{number}_{utterance.id}", utterance)
 
         # One model.
-        model = HeadHmmMethod.from_config(load_config(CONFIG)).fit(together)
+        model = train(HeadHmmMethod, together, load_config(CONFIG), device=options.device)
         model.provenance = {"sources": [person.provenance() for person in people]}
         model.save(options.output)
     print(f"{options.output}: {model.facts['recordings']} parts learned from, {options.output.stat().st_size / 1e3:.0f} kB")
@@ -68,6 +69,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("corpora", type=Path, nargs="+", metavar="CORPUS")
     parser.add_argument("-o", "--output", type=Path, default=TARGET)
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     return parser.parse_args(arguments)
 
 

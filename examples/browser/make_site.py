@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from facesynth.export.face import mesh_deformation_graph
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.models import export_model
+from facesynth.export.parts import mesh_deformation_graph
 from facesynth.face.rig.anny import PARTS
 from facesynth.face.rig.arkit_rig import Rig, load_head
 from facesynth.face.rig.markers import marker_layout

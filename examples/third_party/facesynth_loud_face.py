@@ -29,7 +29,6 @@ CAPABILITIES = Capabilities(
     "every channel follows the loudness of the voice",
     home="facesynth_loud_face",
     options=(Option("liveliness", float, "Factor on the movement about the mean face; 1 as learned.", least=0, most=5),),
-    hears_phones=False,
     minutes=0.2,
 )
 SILENT = 1e-4

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import correlate
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.motion.irregular import read_at
-
-Floats = NDArray[np.float64]
 
 RATE = 1000
 """Envelopes are compared at so many values a second: the offset is known to a millisecond."""

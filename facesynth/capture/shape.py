@@ -12,10 +12,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from facesynth.capture.landmarks import LIP_PAIRS, OUTER_CORNERS, OUTER_CORNERS_MM, RIGID
 from facesynth.capture.track import Track
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pose import remove_head
-
-Floats = NDArray[np.float64]
 
 SCALE_S = 0.5
 """Deviation of the Gaussian that evens the scale out: a head comes nearer slowly, what is quicker is noise."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.followed_points import from_points, keep_videos_of, require_points
+from facesynth.cli.followed_points import Followed, keep_videos_of, points_followed, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
 """Those of a corpus for which nobody says them."""
+FACTS = ("emotion", "intensity", "take", "sentence", "licence", "consent")
+"""Options of `add` that are columns of utterances.csv."""
 MOST_NAMED = 8
 """So many recordings are named on the screen; import.csv names all."""
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -109,9 +111,6 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--list", "list_file", type=FILE, help="CSV with columns as in utterances.csv; id is the files' shared name.")
 @click.option("--sound", type=FILE, help="One long sound of a recorder that ran on for several videos: each finds its part.")
 @click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
-@click.option("--points", is_flag=True, help="Follow salient points of the lower face, for a model that shows the real face.")
-@click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px; it is found otherwise.")
-@click.option("--mask", type=FILE, help="With --points: PNG of the first picture's size, the lower face in white.")
 @click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
 @click.option(
     "--replace",
@@ -119,6 +118,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
     is_flag=True,
     help="Also phones corrected by hand, and recordings of the same name from another folder.",
 )
+@points_followed
 @said_of_files
 @spread_over
 @as_json
@@ -128,25 +128,15 @@ def add(
     files: tuple[Path, ...],
     text: str | None,
     text_file: Path | None,
-    phones: Path | None,
-    speaker: str | None,
-    language: str | None,
-    emotions: Path | None,
     utterance_id: str | None,
     list_file: Path | None,
     sound: Path | None,
-    face: int | None,
-    points: bool,
-    box: str | None,
-    mask: Path | None,
     performer: str | None,
-    replacing: bool,
-    layout_file: Path | None,
-    fps: float | None,
-    axes: str,
+    followed: Followed | None,
+    said: Said,
     workers: Workers,
     as_json: bool,
-    **about: Any,
+    **given: Any,
 ) -> None:
     """Add recordings to the corpus in FOLDER.
 
@@ -162,26 +152,13 @@ def add(
     from facesynth.corpus.importers.recorder import cut_for
     from facesynth.corpus.record import read_listed
 
-    about = {name: value for name, value in about.items() if value is not None}
     listed = read_listed(list_file) if list_file else None
-    where, said = (box, mask) if points or box or mask else None, Said(layout_file, fps, axes)
-    corpus, guessed = _corpus_for(folder, files, _header(folder, performer, about, listed), where, face, said, workers)
+    about = {name: value for name in FACTS if (value := given.pop(name)) is not None}
+    header = _header(folder, performer, about, listed)
+    corpus, guessed = _corpus_for(folder, files, header, followed, given["face"], said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)
     with cut_for(sound, files) as cuts:
-        report = add_recordings(
-            corpus,
-            (*files, *cuts.sounds),
-            known,
-            listed=listed,
-            texts=texts,
-            phones=phones,
-            speaker=speaker,
-            language=language,
-            emotions=emotions,
-            face=face,
-            replacing=replacing,
-            workers=workers,
-        )
+        report = add_recordings(corpus, (*files, *cuts.sounds), known, listed=listed, texts=texts, workers=workers, **given)
     keep_videos_of(corpus, files, report, utterance_id)
     _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_summary(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
@@ -193,7 +170,7 @@ def add(
 @click.option("-o", "--output", "folder", type=FOLDER, required=True, help="Folder for the files made.")
 @said_of_files
 @as_json
-def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps: float | None, axes: str, as_json: bool) -> None:
+def convert(files: tuple[Path, ...], folder: Path, said: Said, as_json: bool) -> None:
     """Turn recordings of other systems into plain files, for those who want files; `corpus add` reads them itself.
 
     FILES are files or folders of C3D, Live Link Face CSV, articulography (MVIEW .mat), BEAT2 poses, or CSV, NPZ and MAT of
@@ -203,7 +180,7 @@ def convert(files: tuple[Path, ...], folder: Path, layout_file: Path | None, fps
     from facesynth.corpus.importers.convert import convert as convert_files
     from facesynth.corpus.importers.description import LAYOUT
 
-    report = convert_files(files, folder, description=Said(layout_file, fps, axes).description(), fps=fps)
+    report = convert_files(files, folder, description=said.description(), fps=said.fps)
     lines = [f"converted {len(report.converted)}, not usable {len(report.refused)}"]
     if report.converted:
         lines.append(f"make their corpus with `facesynth corpus new NAME --layout {folder / LAYOUT} --fps {report.fps:g} …`")
@@ -281,25 +258,22 @@ def _corpus_for(
     folder: Path,
     files: tuple[Path, ...],
     header: Mapping[str, Any],
-    points: tuple[str | None, Path | None] | None,
+    followed: Followed | None,
     face: int | None,
     said: Said,
     workers: Workers,
 ) -> tuple[Corpus, tuple[str, ...]]:
-    """The corpus in a folder, or a new one for the performer of recordings, and what was guessed of them.
-
-    points: box and mask where they are to be followed.
-    """
+    """The corpus in a folder, or a new one for the performer of recordings, and what was guessed of them."""
     from facesynth.corpus import Corpus
     from facesynth.corpus.importers.video import corpus_from_video
 
     if (folder / "corpus.yaml").exists():
         corpus = Corpus.open(folder)
-        require_points(corpus, points is not None)
+        require_points(corpus, followed is not None)
         said.require_nothing()
         return corpus, ()
-    if points is not None:
-        return from_points(folder, files, header, *points, face), ()
+    if followed is not None:
+        return followed.corpus(folder, files, header, face), ()
     if (made := said.corpus(folder, files, header, workers)) is not None:
         return made
     return corpus_from_video(folder, files, header, face=face, workers=workers), ()

@@ -104,13 +104,15 @@ def trained_model(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     from facesynth.cache import cache_dir
     from facesynth.methods.model_file import FORMAT
     from facesynth.methods.registry import DEFAULT, create, load
+    from facesynth.methods.training import train
 
     model = create(DEFAULT)
     made_of = json.dumps([__version__, FORMAT, model.config, corpus.provenance()["sha256"], seed])
     path = cache_dir("models") / f"demo-{DEFAULT}-{sha256(made_of.encode()).hexdigest()[:16]}.safetensors"
     if path.exists():
         return load(path), False
-    model.fit(corpus, seed=seed).save(path)
+    model = train(type(model), corpus, model.config, seed=seed)
+    model.save(path)
     model.path = path
     return model, True
 

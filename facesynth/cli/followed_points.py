@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import click
 
 from facesynth.inference.errors import FacesynthError
 
@@ -13,15 +17,39 @@ if TYPE_CHECKING:
     from facesynth.corpus.add.add import AddReport
 
 
-def from_points(
-    folder: Path, files: tuple[Path, ...], header: Mapping[str, Any], box: str | None, mask: Path | None, face: int | None
-) -> Corpus:
-    """A new corpus of points followed in videos."""
-    from facesynth.capture.points.finding import read_mask
-    from facesynth.corpus.importers.points import Where, corpus_from_points
+@dataclass(frozen=True)
+class Followed:
+    """Where the face is in the first picture, as it was given; it is found otherwise."""
 
-    where = Where(_numbers(box) if box else None, read_mask(mask) if mask else None, face)
-    return corpus_from_points(folder, files, header, where)
+    box: str | None
+    mask: Path | None
+
+    def corpus(self, folder: Path, files: tuple[Path, ...], header: Mapping[str, Any], face: int | None) -> Corpus:
+        """A new corpus of points followed in videos."""
+        from facesynth.capture.points.finding import read_mask
+        from facesynth.corpus.importers.points import Where, corpus_from_points
+
+        where = Where(_numbers(self.box) if self.box else None, read_mask(self.mask) if self.mask else None, face)
+        return corpus_from_points(folder, files, header, where)
+
+
+def points_followed(command: Any) -> Any:
+    """The options --points, --box and --mask, which the command gets as `followed`: None where no points are."""
+
+    @wraps(command)
+    def with_points(*, points: bool, box: str | None, mask: Path | None, **options: Any) -> None:
+        command(followed=Followed(box, mask) if points or box or mask else None, **options)
+
+    options = (
+        click.option("--points", is_flag=True, help="Follow salient points of the lower face, to show the real face."),
+        click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px."),
+        click.option(
+            "--mask", type=click.Path(path_type=Path), help="With --points: PNG of that picture's size, the lower face in white."
+        ),
+    )
+    for option in reversed(options):
+        with_points = option(with_points)
+    return with_points
 
 
 def _numbers(box: str) -> tuple[float, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +57,12 @@ class Said:
 
 
 def said_of_files(command: Any) -> Any:
-    """The options --layout, --fps and --axes."""
+    """The options --layout, --fps and --axes, which the command gets as `said`."""
+
+    @wraps(command)
+    def with_said(*, layout_file: Path | None, fps: float | None, axes: str, **options: Any) -> None:
+        command(said=Said(layout_file, fps, axes), **options)
+
     options = (
         click.option(
             "--layout",
@@ -72,8 +78,8 @@ def said_of_files(command: Any) -> Any:
         ),
     )
     for option in reversed(options):
-        command = option(command)
-    return command
+        with_said = option(with_said)
+    return with_said
 
 
 def read_layout(path: Path) -> Layout:

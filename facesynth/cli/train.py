@@ -13,6 +13,7 @@ import click
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
+    from facesynth.methods.method import Method
 
 
 @click.command("train")
@@ -53,7 +54,6 @@ def train(
     of CORPUS, or of one that comes with facesynth, by its name (`arkit`): nothing is recorded for it.
     """
     from facesynth.config import load_config, parse_settings
-    from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
     from facesynth.device import device_of
     from facesynth.methods.registry import method_class, of_table
@@ -61,43 +61,49 @@ def train(
     from facesynth.stage.speaker_pictures import save_face
 
     chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
-    configured = chosen.pop("device", "auto")
-    place = device_of(device or str(configured))
+    place, workers = device_of(device or str(chosen.pop("device", "auto"))), Workers(**who)
+    path = output or Path(f"{method}.safetensors")
     if method == "emotion":
         from facesynth.cli.emotion import train_detector
 
-        part = seed if split == "train" else None
-        train_detector(corpus, chosen, output or Path("emotion.safetensors"), part, workers=Workers(**who), as_json=as_json)
+        train_detector(corpus, chosen, path, seed if split == "train" else None, workers=workers, as_json=as_json)
         return
-    _require_alone(method, Workers(**who))
-    path = output or Path(f"{method}.safetensors")
+    _require_alone(method, workers)
     if (made := of_table(method, str(corpus), chosen)) is not None:
         made.save(path)
         _tell_made(path, method, len(made.fitted_layout.names), as_json=as_json)
         return
-    wanted = method_class(method)
-    wanted.from_config(chosen)
-    recordings = Corpus.open(corpus)
-    _require_speech(recordings)
-    if split == "train":
-        recordings, _ = recordings.split(seed)
+    method_class(method).from_config(chosen)  # a wrong setting is told before a corpus is read
+    recordings = _recordings(corpus, seed if split == "train" else None)
     start = time.perf_counter()
-    model = learn(wanted, recordings, chosen, seed=seed, device=place)
+    model = learn(method_class(method), recordings, chosen, seed=seed, device=place)
     seconds = time.perf_counter() - start
     model.save(path)
-    face = save_face(recordings, path)
+    _tell_learned(model, recordings, path, save_face(recordings, path), seconds, as_json=as_json)
+
+
+def _recordings(corpus: Path, seed: int | None) -> Corpus:
+    """What is learned from: all recordings, or with a seed those of the sentences to train on."""
+    from facesynth.corpus import Corpus
+
+    recordings = Corpus.open(corpus)
+    _require_speech(recordings)
+    return recordings if seed is None else recordings.split(seed)[0]
+
+
+def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | None, seconds: float, *, as_json: bool) -> None:
+    """What was learned from whom, and where it is."""
     size_mb = path.stat().st_size / 1e6
-    facts = {"model": str(path), "method": method, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
+    facts = {"model": str(path), "method": model.name, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
     facts |= _left_out(model.facts)
     if as_json:
         click.echo(json.dumps({**facts, "synthetic": recordings.synthetic}))
         return
     kind = "synthetic performer" if recordings.synthetic else "performer"
-    click.echo(f"{method} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
+    click.echo(f"{model.name} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
     if moved := model.facts.get("repaired"):
-        click.echo(
-            f"unstable: eigenvalues of modulus {', '.join(f'{m:.3f}' for m in moved)} were moved inside, the rest refitted"
-        )
+        moduli = ", ".join(f"{modulus:.3f}" for modulus in moved)
+        click.echo(f"unstable: eigenvalues of modulus {moduli} were moved inside, the rest refitted")
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

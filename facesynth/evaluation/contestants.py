@@ -14,7 +14,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.method import Method
 from facesynth.methods.registry import capabilities_of, create, known_capabilities, method_class
-from facesynth.methods.training import CPU, train
+from facesynth.methods.training import train
 
 SECOND_TAKE = "second take"
 """The label of the row that is a recording."""
@@ -45,7 +45,7 @@ class Contestant:
         """The method, untrained; unknown settings are answered with the nearest known one."""
         return create(self.method, **self.settings)
 
-    def train(self, corpus: Corpus, seed: int, device: torch.device = CPU) -> Method:
+    def train(self, corpus: Corpus, seed: int, device: torch.device | None = None) -> Method:
         """The method, trained on a device."""
         return train(method_class(self.method), corpus, self.settings, seed=seed, device=device)
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import ks_2samp
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.gaze import facing, gaze_shifts
 from facesynth.motion.gaps import runs
 
-Floats = NDArray[np.float64]
 Samples = Mapping[str, Floats]
 """What was measured, by its name."""
 

@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from facesynth.evaluation.contestants import SECOND_TAKE
 from facesynth.evaluation.table import Column, Comparison, Row
+from facesynth.inference.arrays import Floats
 
 COMPARED = (
     "marker_error", "lve", "lve_centred", "velocity_error", "fdd_abs", "lip_gap_corr", "closure_rate",
@@ -23,8 +24,6 @@ CHUNK, WIDTH = 5_000, 128
 LEVEL = 0.05
 MOST_NAMED = 12
 """Pairs that cannot be told apart are named one by one up to so many."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

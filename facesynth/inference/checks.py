@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import FacesynthError
+from .layout import Layout
 
 
 def checked_piece(audio: ArrayLike) -> NDArray[np.float32]:
@@ -38,6 +39,15 @@ def checked_rate(got: float, wanted: int) -> None:
     if got != wanted:
         raise FacesynthError(
             f"the sound has {got} Hz; wanted {wanted} Hz: bring pieces there with Resampler, whole sounds with resample"
+        )
+
+
+def require_layout(got: Layout, own: Layout, does: str) -> None:
+    """FacesynthError where motion is not of the layout of a model, which `does` so with it."""
+    if (got.kind, got.names) != (own.kind, own.names):
+        raise FacesynthError(
+            f"this model {does} motion of its own layout ({len(own.names)} {own.kind}); "
+            f"got {len(got.names)} {got.kind} with other names: train both on one performer"
         )
 
 

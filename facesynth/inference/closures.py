@@ -9,6 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .layout import Layout
 from .lips import Span, gap, has_lips, pair_gaps
 
@@ -22,8 +23,6 @@ CLOSING_S = 0.04
 """In `close_at`, lips take at least this long to close and to open, seconds."""
 LONGEST_CLOSING_S = 0.15
 """… and at most this long, so that a stream knows how much to hold back."""
-
-Floats = NDArray[np.float64]
 
 
 def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: NDArray[np.int64], fps: float) -> Floats:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .errors import FacesynthError
 from .pitch import PITCH_WINDOW, RATE, VOICED, pitch_of
 
@@ -19,7 +20,6 @@ SMALLEST_POWER = 1e-8
 STILL = 1e-4
 """A sound that moves less than this is constant."""
 
-Floats = NDArray[np.float64]
 FrontEnd = Callable[..., list[NDArray[Any]]]
 """`audio` [1, S] at 16 kHz to power [1, T, 257], log mel bands [1, T, 40] and cepstra [1, T, 20], frames 10 ms apart."""
 _FREQUENCIES = np.arange(FFT // 2 + 1) * RATE / FFT

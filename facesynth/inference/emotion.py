@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Floats
 from .checks import checked_audio, checked_piece, checked_rate, require_open
-from .contours import STILL, Floats
+from .contours import STILL
 from .emotion_track import HOP_S, NOBODY_SPEAKS, WINDOW_S, check_windows, mean_of_windows, track_of, window_starts
 from .errors import FacesynthError
 from .folder import MANIFEST, Folder

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .contours import Floats
+from .arrays import Floats
 from .errors import FacesynthError
 from .filters import gaussian
 from .motion import Motion

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import unknown
 from .filters import cubic_at
 from .folder import Folder
@@ -32,9 +33,7 @@ BEYOND = 2
 LOG_SECOND = 2.5
 """Added to the logarithm of a phone's duration in seconds: phones of 80 ms are at 0."""
 
-Floats = NDArray[np.float64]
 Single = NDArray[np.float32]
-Ints = NDArray[np.int64]
 Bands = Callable[[Speech], Single]
 """From a speech to its log-mel bands [F, B]."""
 

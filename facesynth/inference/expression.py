@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import checked_seed
+from .arrays import Floats, Ints
+from .checks import checked_seed, require_layout
 from .closures import keep_shut
 from .emotion_track import felt_over
-from .errors import FacesynthError, reject_options, unknown
+from .errors import reject_options, unknown
 from .filters import at_rate
 from .folder import Folder
 from .graphs import Graph
@@ -28,9 +29,6 @@ from .motion import Motion
 from .patches import Growth, PatchSettings, PatchTexture
 from .phone_context import context_of
 from .speech import NEUTRAL, PhoneTrack, Speech
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,7 @@ class Expression:
 
         Where the intensity is 0, or the emotion neutral, the motion stays as it is, to the byte.
         """
-        self._require_layout(motion.layout)
+        require_layout(motion.layout, self.layout, "adds expressions to")
         frames = motion.frames.astype(np.float64)
         added = np.zeros_like(frames)
         for emotion in sorted(set(speech.emotions.labels) - {NEUTRAL}):
@@ -129,13 +127,6 @@ class Expression:
         pieces = [self.parts.signals[self.parts.starts[k] : stops[k]] for k in mine]
         starts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
         return PatchTexture(np.concatenate(pieces), starts, self.parts.settings)
-
-    def _require_layout(self, got: Layout) -> None:
-        if (got.kind, got.names) != (self.layout.kind, self.layout.names):
-            raise FacesynthError(
-                f"this model adds expressions to motion of its own layout ({len(self.layout.names)} {self.layout.kind}); "
-                f"got {len(got.names)} {got.kind} with other names: train both on one performer"
-            )
 
 
 def load_expression(folder: Folder, threads: int) -> Expression:

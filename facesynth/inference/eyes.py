@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .errors import reject_options
 from .folder import Folder
 from .gaze import head_turns, quick_turns, within_reach
@@ -14,8 +15,6 @@ from .layout import Layout
 from .motion import Motion
 from .patches import Growth, PatchSettings, PatchTexture
 from .speech import Speech
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

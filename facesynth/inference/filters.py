@@ -1,9 +1,9 @@
 """Filters and splines over time: what scipy would give, in numpy. Signals are [T, C], time first."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from .arrays import Floats
 
 PASS, ORDER = 0.9, 6
 """Movement up to this share of the new rate's Nyquist frequency is kept when a rate falls, by a Butterworth filter."""

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .filters import gaussian
-
-Floats = NDArray[np.float64]
 
 REACH_RAD = np.radians((35.0, 25.0))
 """How far eyes turn in the head, sideways and up or down, without strain."""

@@ -28,8 +28,6 @@ HALF_WINDOW = 256
 AROUND = 3
 """Frames of bands that are heard once more beside new ones: the first of a piece lack what came before it."""
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Network:

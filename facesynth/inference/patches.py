@@ -11,12 +11,9 @@ with the variance V_c of each channel. One of those that qualify is drawn, and f
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Floats, Ints
 from .errors import FacesynthError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SMALLEST = 1e-9
 """Variance of a channel that does not move."""

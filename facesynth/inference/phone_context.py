@@ -1,15 +1,11 @@
 """What phones tell of the face around the mouth: which are said around a moment, how near the beginning and the end are."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Floats
 from .filters import gaussian
 from .phones import VISEME_CLASSES, viseme_of
 from .speech import PhoneTrack
-
-Floats = NDArray[np.float64]
 
 AROUND_S = 0.05
 """Standard deviation of the window in which phones count."""

@@ -1,7 +1,8 @@
 """Pitch of windows of sound."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from .arrays import Floats
 
 RATE = 16000
 """Hz of the sound."""
@@ -11,8 +12,6 @@ OCTAVE_COST = 0.02
 """What an octave down costs a pitch candidate, in units of the autocorrelation: the highest good one wins."""
 VOICED = 0.55
 """Autocorrelation from which a frame counts as voiced."""
-
-Floats = NDArray[np.float64]
 
 
 def pitch_of(framed: Floats) -> tuple[Floats, Floats]:

@@ -1,9 +1,9 @@
 """Rotations as unit quaternions [..., 4] (w, x, y, z), and curves through them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .arrays import Floats
+
 TINY = 1e-12
 
 

@@ -3,14 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .contours import Contours, FrontEnd, contours
 
 PERCENTILES = (10, 50, 90)
 STRETCHES = 5
 """Into how many stretches an utterance is cut to see where it rises and falls."""
 MODULATION_HZ = ((0.5, 2), (2, 4), (4, 8), (8, 16), (16, 32))
-
-Floats = NDArray[np.float64]
 
 
 def voice_features(audio: NDArray[np.float32], front: FrontEnd) -> Floats:

@@ -209,8 +209,6 @@ class Capabilities:
     """Of the protocols above."""
     layouts: tuple[str, ...] = ("markers", "landmarks", "curves")
     """Kinds of motion that it learns."""
-    hears_phones: bool = True
-    """Whether what is said counts, and not the sound alone."""
     minutes: float = 0.0
     """Of speech that it should have to learn from; a rule of thumb."""
     of_each_phone: int = 0

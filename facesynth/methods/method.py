@@ -64,7 +64,11 @@ class Method(nn.Module):
 
     @classmethod
     def from_config(cls, config: Mapping[str, Any]) -> Self:
-        """Make one from a dictionary whose keys are checked against the constructor's arguments."""
+        """Make one from a dictionary whose keys are checked against the constructor's arguments.
+
+        `device` is where a method is trained, and no setting of it: `facesynth.methods.training.train` reads that.
+        """
+        config = {key: value for key, value in config.items() if key != "device"}
         known = [p for p in inspect.signature(cls.__init__).parameters if p != "self"]
         for key in config:
             if key not in known:

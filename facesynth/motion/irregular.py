@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from facesynth.inference.arrays import Floats
 from facesynth.motion.gaps import missing_in
-
-Floats = NDArray[np.float64]
 
 USUAL_FPS = (24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 90, 100, 120, 150, 200, 240, 250, 300, 400, 500)
 """Rates of cameras and capture systems, Hz."""

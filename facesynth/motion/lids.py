@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import runs
 
-Floats = NDArray[np.float64]
 DIP, DIP_S = 0.3, 0.5
 """A blink takes the lids down by at least this share of the opening, and up again within this time, seconds."""
 DEEPEST = 0.1

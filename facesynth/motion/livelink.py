@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.encoding import decoded
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
-
-Floats = NDArray[np.float64]
 
 TIMECODE, COUNT = "Timecode", "BlendshapeCount"
 ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from facesynth.inference.arrays import Floats
 
 _CALLED: tuple[tuple[str, str], ...] = (
     ("eyelids", r"lid|eye(?!brow|br)"),

@@ -1,9 +1,12 @@
 """An utterance becomes a performance: 52 facial weights, head and eyes at every frame."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
 
 from facesynth.face.rig.arkit import gaze_weights
 from facesynth.face.rig.markers import LipGap
@@ -12,11 +15,120 @@ from facesynth.inference.speech import Speech
 from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.performer.articulation import Articulation, articulate
 from facesynth.performer.cues import Cues, listen
-from facesynth.performer.emotion import feel, show, sides
-from facesynth.performer.eyes import Eyes, look
-from facesynth.performer.head_motion import move_head
+from facesynth.performer.emotion import Feelings, feel, show, sides
 from facesynth.performer.targets import CURVES, SHAPES
 from facesynth.performer.wander import wander
+
+
+@dataclass(frozen=True)
+class Posture:
+    """How an emotion carries the head."""
+
+    down_deg: float = 0.0
+    roll_deg: float = 0.0
+    forward_mm: float = 0.0
+    down_mm: float = 0.0
+    liveliness: float = 1.0
+    """Factor of all movement."""
+
+
+POSTURES: Mapping[str, Posture] = {
+    "neutral": Posture(),
+    "happy": Posture(down_deg=-2.0, roll_deg=2.5, forward_mm=1.0, liveliness=1.25),
+    "angry": Posture(down_deg=4.0, forward_mm=5.0, liveliness=1.3),
+    "sad": Posture(down_deg=6.0, roll_deg=3.0, forward_mm=-2.0, down_mm=3.0, liveliness=0.6),
+}
+
+
+def move_head(feelings: Feelings, cues: Cues, fps: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """[T, 6] rotation vector (rad) and translation (mm) about the rig's pivot."""
+    count = len(cues.pitch)
+    shares = np.clip(feelings.brows, 0.0, 1.2)
+    livelier = np.array([POSTURES[emotion].liveliness - 1.0 for emotion in feelings.emotions])
+    lively = 1.0 + shares @ livelier
+    angles_deg = _swing(count, cues, fps, rng) * lively[:, None]
+    shift_mm = np.stack([wander(count, fps, hz, rng) for hz in (0.3, 0.35, 0.3)], axis=1) * (1.2, 0.6, 1.5)
+    shift_mm[:, 2] += 1.0 * gaussian_filter1d(cues.accents, 0.06 * fps, mode="nearest") * lively
+    for index, emotion in enumerate(feelings.emotions):
+        posture = POSTURES[emotion]
+        angles_deg += shares[:, index, None] * (posture.down_deg, 0.0, posture.roll_deg)
+        shift_mm += shares[:, index, None] * (0.0, -posture.down_mm, posture.forward_mm)
+    turns = Rotation.from_euler("YXZ", angles_deg[:, [1, 0, 2]], degrees=True)
+    return np.concatenate([turns.as_rotvec(), shift_mm], axis=1)
+
+
+def _swing(count: int, cues: Cues, fps: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """[T, 3] degrees down, to the performer's left, and roll."""
+    nods = gaussian_filter1d(cues.accents, 0.035 * fps, mode="nearest")
+    loud = gaussian_filter1d(np.clip(cues.loudness, 0.0, 1.5), 0.15 * fps, mode="nearest")
+    down, left, roll = (amount * wander(count, fps, hz, rng) for amount, hz in ((1.1, 0.45), (1.6, 0.35), (1.1, 0.3)))
+    lean = rng.normal(0.0, (0.8, 1.2, 0.8))
+    down = down + 2.6 * nods - 1.0 * cues.pitch + 0.6 * (loud - loud.mean())
+    left = left + rng.normal(0.0, 0.5) * cues.pitch
+    swing: NDArray[np.float64] = gaussian_filter1d(np.stack([down, left, roll], axis=1), 0.05 * fps, axis=0, mode="nearest")
+    return swing + lean
+
+
+SHUT_S, STAY_S, OPEN_S = 0.07, 0.03, 0.16
+"""A blink: down, closed, up again."""
+BETWEEN_BLINKS_S = (1.6, 4.2)
+BLINK_EVERY: Mapping[str, float] = {"neutral": 1.0, "happy": 1.0, "angry": 1.4, "sad": 1.2}
+"""Factor of the time between blinks."""
+FIXATION_S = (0.5, 1.8)
+AWAY = 0.65
+"""Share of fixations beside the listener's eyes."""
+AWAY_DEG = (2.4, 1.3)
+"""Standard deviation of such a look, sideways and up."""
+COMPENSATION = 0.6
+"""Share of the head's turn that the eyes undo."""
+SAD_GAZE_DEG = -4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Eyes:
+    """What the eyes do over T frames."""
+
+    blink: NDArray[np.float64]
+    """[T] 0 open to 1 shut, by blinking alone."""
+    gaze_rad: NDArray[np.float64]
+    """[T, 2] relative to the head: to the performer's left, up."""
+
+
+def look(feelings: Feelings, head: NDArray[np.float64], fps: float, rng: np.random.Generator) -> Eyes:
+    """Eyes for a head [T, 6] that moves."""
+    count = len(head)
+    gaze_deg = _saccades(count, fps, rng)
+    gaze_deg[:, 1] += SAD_GAZE_DEG * np.clip(feelings.share("sad"), 0.0, 1.2)
+    gaze_deg += 0.15 * np.stack([wander(count, fps, 2.0, rng), wander(count, fps, 2.0, rng)], axis=1)
+    down, left = head[:, 0], head[:, 1]
+    gaze = np.radians(gaze_deg) + COMPENSATION * np.stack([-left, down], axis=1)
+    return Eyes(_blinks(feelings, count, fps, rng), gaze)
+
+
+def _saccades(count: int, fps: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """[T, 2] degrees: fixations, joined by jumps of some 30 ms."""
+    gaze = np.zeros((count, 2))
+    time_s = 0.0
+    while time_s < count / fps:
+        gaze[round(time_s * fps) :] = rng.normal(0.0, AWAY_DEG) * (rng.random() < AWAY)
+        time_s += rng.uniform(*FIXATION_S)
+    smooth: NDArray[np.float64] = gaussian_filter1d(gaze, 0.012 * fps, axis=0, mode="nearest")
+    return smooth
+
+
+def _blinks(feelings: Feelings, count: int, fps: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    times = np.arange(count) / fps
+    shares = np.clip(feelings.brows, 0.0, 1.0)
+    rarer = 1.0 + shares @ np.array([BLINK_EVERY[emotion] - 1.0 for emotion in feelings.emotions])
+    closed = np.zeros(count)
+    start_s = rng.uniform(0.3, 1.5)
+    while start_s + SHUT_S + STAY_S < times[-1]:
+        since = times - start_s
+        falling, rising = since / SHUT_S, 1.0 - (since - SHUT_S - STAY_S) / OPEN_S
+        closed = np.maximum(closed, np.clip(np.minimum(falling, rising), 0.0, 1.0))
+        start_s += rng.uniform(*BETWEEN_BLINKS_S) * rarer[min(round(start_s * fps), count - 1)]
+    return closed * closed * (3 - 2 * closed)
+
 
 TUCK_GAP_MM = 2.4
 """Inner-lip gap where the lower lip is at the upper teeth."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facesynth.capture.steady import CUTOFF_HZ, steadied
+from facesynth.capture.motion import CUTOFF_HZ, steadied
 
 FPS = 60
 

@@ -12,17 +12,17 @@ pytest.importorskip("PIL", reason="pillow is not installed")
 
 
 def test_letters_that_a_font_lacks_are_written_with_others():
-    from facesynth.corpus import lettering
+    from facesynth.corpus import pictures
 
-    plain = lettering._fonts()[-1]
-    assert lettering.legible("Ünï köde: ok", plain) in ("Uni kode: ok", "Ünï köde: ok")
-    assert lettering.legible("你好 x", plain) == "[4F60 597D] x"
-    assert lettering.legible("", plain) == ""
+    plain = pictures._fonts()[-1]
+    assert pictures.legible("Ünï köde: ok", plain) in ("Uni kode: ok", "Ünï köde: ok")
+    assert pictures.legible("你好 x", plain) == "[4F60 597D] x"
+    assert pictures.legible("", plain) == ""
 
 
 def test_accents_and_cyrillic_are_drawn_as_they_are_where_matplotlib_is_installed():
     pytest.importorskip("matplotlib", reason="DejaVu Sans comes with it")
-    from facesynth.corpus.lettering import font_for, legible
+    from facesynth.corpus.pictures import font_for, legible
 
     for text in ("Ünï köde", "Žluťoučký kůň", "Привет"):
         assert legible(text, font_for(text)) == text

@@ -6,14 +6,30 @@ from corpora import tiny_corpus
 from living_eyes import with_eyes
 from nodding import nodding_corpus
 
-from facesynth.evaluation.papers import Material, reproduce
+from facesynth.config import load_config
+from facesynth.evaluation.papers import Material, deng2006_speech, reproduce
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import DEGREES, SPEECH
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
 from facesynth.evaluation.papers.joined import joined, phones_until
 from facesynth.inference.errors import FacesynthError
+from facesynth.methods.coarticulation.method import Coarticulation
 from facesynth.methods.coarticulation.transitions import PENALTIES
+from facesynth.methods.efase import tuning
+from facesynth.methods.efase.method import Efase
+
+
+@pytest.mark.parametrize(
+    ("file", "method", "published"),
+    [
+        ("efase_published", Efase, tuning.PUBLISHED),
+        ("coarticulation_paper", Coarticulation, deng2006_speech.PUBLISHED),
+    ],
+)
+def test_published_settings_are_those_of_the_files(file, method, published, repository):
+    written = load_config(repository / "configs" / f"{file}.yaml")
+    assert method.from_config(published).config == method.from_config(written).config
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from facesynth.export.graph import difference
 from facesynth.export.models import export_model
 from facesynth.inference import FacesynthError, load
 from facesynth.inference.efase import search as engine
+from facesynth.inference.efase.assembly import smoothing_spline
 from facesynth.inference.efase.bounds import step_bounds
 from facesynth.inference.efase.costs import Query, Weights, all_targets
 from facesynth.inference.efase.nodes import COLUMNS, Nodes
@@ -19,7 +20,6 @@ from facesynth.inference.efase.search import Search, SearchIndex
 from facesynth.inference.efase.steps import path_cost, step_costs
 from facesynth.inference.efase.stream import GUARD_S
 from facesynth.inference.filters import butterworth, forth_and_back, gaussian, spline_at
-from facesynth.inference.joints import smoothing_spline
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.learn import expectation as prediction

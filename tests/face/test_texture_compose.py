@@ -4,8 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from facesynth.face.texture.compose import Report, TexturedFace, ping_pong
-from facesynth.face.texture.sources import coherent, nearest
+from facesynth.face.texture.compose import Report, TexturedFace, coherent, nearest, ping_pong
 from facesynth.face.texture.speaker import Speaker, lower_face_window
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.planar import HeadMaps

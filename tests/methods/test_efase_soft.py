@@ -18,6 +18,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import stretched, time_warp
 from facesynth.methods.efase.learning import tensors
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.torch_search import torch_mix
 from facesynth.methods.registry import load
 from facesynth.motion.search.posterior import posterior
 from facesynth.motion.search.steps import GivenSteps
@@ -43,9 +44,10 @@ def mixed(found, count):
     return singles
 
 
+@pytest.mark.parametrize("mixing", [None, torch_mix])
 @pytest.mark.parametrize("temperature", [0.3, 5.0, 200.0])
 @pytest.mark.parametrize("fixed", [0, 1])
-def test_equals_the_enumeration_of_all_paths(temperature, fixed):
+def test_equals_the_enumeration_of_all_paths(temperature, fixed, mixing):
     rng = np.random.default_rng(int(temperature * 10) + fixed)
     for _ in range(6):
         nodes, weights = random_nodes(rng, 7, sentence=4), Weights(3.0)
@@ -55,7 +57,8 @@ def test_equals_the_enumeration_of_all_paths(temperature, fixed):
         targets = all_targets(nodes, query, weights) + extra
         path = targets.argmin(axis=1)
         allowed = [np.flatnonzero(np.isfinite(row)) for row in targets]
-        found = soft_search(nodes, query, targets, weights, path, temperature, 7)
+        mix = mixing and mixing(nodes, weights)
+        found = soft_search(nodes, query, targets, weights, path, temperature, 7, mix=mix)
         singles, captured = enumerated(nodes, query, extra, weights, temperature, allowed)
         np.testing.assert_allclose(mixed(found, 7), singles, atol=1e-9)
         np.testing.assert_allclose([m.captured for m in found], captured, atol=1e-9)

@@ -16,10 +16,10 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.innovations import Innovations
 from facesynth.methods.lds.method import LDS
-from facesynth.methods.lds.orders import folds, plainest_good
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 from facesynth.methods.lds.prediction import innovations, one_step
 from facesynth.methods.lds.rollout import Rollout
+from facesynth.methods.lds.selection import folds, plainest_good
 from facesynth.methods.lds.system import Clip
 from facesynth.methods.registry import load
 

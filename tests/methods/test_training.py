@@ -3,6 +3,7 @@
 import copy
 
 import pytest
+import torch
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.baselines.ridge import Ridge
@@ -49,6 +50,16 @@ def test_a_config_is_refused_before_anything_is_learned(monkeypatch):
         train(Guess, [], {"numbr": 3})
     with pytest.raises(FacesynthError, match="must be a int"):
         train(Guess, [], {"number": "many"})
+
+
+def test_the_config_says_where_it_is_trained_unless_the_caller_does(monkeypatch):
+    asked = []
+    monkeypatch.setattr("facesynth.methods.training.device_of", lambda name: asked.append(name) or torch.device("cpu"))
+    train(Guess, [1], {"device": "auto"})
+    train(Guess, [1], {"device": "auto"}, device="cuda")
+    train(Guess, [1], {}, device=torch.device("cpu"))
+    assert asked == ["auto", "cuda"]
+    assert train(Guess, [1], {"device": "auto"}).config == {"number": 1, "sure": False}
 
 
 def test_a_method_that_learns_nothing_before_remembers_nothing():

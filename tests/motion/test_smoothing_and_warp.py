@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from facesynth.inference.joints import smooth_joint
+from facesynth.inference.efase.assembly import smooth_joint
 from facesynth.inference.warp import time_warp
 
 

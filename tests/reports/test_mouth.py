@@ -8,7 +8,7 @@ from grids import long_grid, put
 from heads import head
 
 from facesynth.face.rig.markers import LipGap
-from facesynth.face.solve.mouth import CLOSE, JAW, MOUTH, amplified, close_within_jaw
+from facesynth.face.solve.animate import CLOSE, JAW, MOUTH, amplified, close_within_jaw
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
 PAPA = [("P", 0.0, 0.2), ("AA1", 0.2, 0.4), ("P", 0.4, 0.6), ("AA1", 0.6, 0.8), ("M", 0.8, 1.0), ("AA1", 1.0, 1.2)]

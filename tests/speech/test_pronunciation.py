@@ -5,8 +5,7 @@ import pytest
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES
-from facesynth.speech.letter_to_sound import sound_out, spell_out
-from facesynth.speech.pronunciation import is_known, pronounce, pronunciations
+from facesynth.speech.pronunciation import is_known, pronounce, pronunciations, sound_out, spell_out
 from facesynth.speech.transcript import words_of
 
 

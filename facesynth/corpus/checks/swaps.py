@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from facesynth.corpus.checks.problem import Problem
 from facesynth.corpus.journal import node_name
+from facesynth.inference.arrays import Floats
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.gaps import missing_in, runs
 
-Floats = NDArray[np.float64]
 Pairs = NDArray[np.int64]
 
 NEIGHBOURS = 14

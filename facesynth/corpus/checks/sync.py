@@ -16,6 +16,7 @@ from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import read_motion
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.lips import lip_gap
@@ -23,8 +24,6 @@ from facesynth.inference.motion import Motion
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio
 from facesynth.speech.audio import resample as resample_audio
-
-Floats = NDArray[np.float64]
 
 RATE = 50
 """Everything is compared at so many values a second."""

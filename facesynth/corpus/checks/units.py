@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus.checks.problem import Problem
+from facesynth.inference.arrays import Floats
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-
-Floats = NDArray[np.float64]
 
 UNITS_MM = {
     "metres": 1e3,

@@ -3,16 +3,15 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
+from facesynth.inference.arrays import Floats
 from facesynth.inference.layout import Layout
 from facesynth.motion.livelink import ANGLES, Take, read_take
 
 HEAD_ANGLES, EYE_ANGLES = ANGLES[:3], ANGLES[3:]
 """Those of the eyes are kept as curves of their own (`leftEyeYaw`, …; rad): a motion has one gaze, a take two, and rolls."""
-Floats = NDArray[np.float64]
 
 
 def read_livelink_motion(path: Path, fps: float | None = None) -> Reading:

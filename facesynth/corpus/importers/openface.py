@@ -4,11 +4,11 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.importers.timed import at_steady_rate
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Kind, Layout
 from facesynth.motion.cells import read_cells
@@ -32,7 +32,6 @@ OUR_AXES = np.array([1.0, -1.0, -1.0])
 """Signs from a camera's axes (right, down, away) to ours; its right is the performer's left."""
 FULL_BLINK = 5.0
 """Of action unit 45."""
-Floats = NDArray[np.float64]
 
 
 def is_openface(path: Path) -> bool:

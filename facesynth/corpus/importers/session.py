@@ -23,6 +23,7 @@ from facesynth.corpus.importers.description import (
 )
 from facesynth.corpus.importers.formats import read
 from facesynth.corpus.workers import ALONE, Workers, spread
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.motion.point_groups import guess_groups, spans_a_plane
@@ -35,7 +36,6 @@ LOOKED_AT = 80
 CLOSED_SHARE = 0.15
 """Share of the frames, those in which the lips are nearest, that show the mouth at rest."""
 ROUNDS = 3
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

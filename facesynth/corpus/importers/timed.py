@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.gaps import LONGEST_S
 from facesynth.motion.irregular import ROUNDING_S, USUAL_FPS, read_at, steady_rate
-
-Floats = NDArray[np.float64]
 
 
 def at_steady_rate(path: Path, signal: Floats, times_s: Floats) -> tuple[NDArray[np.float32], float, tuple[str, ...]]:

@@ -20,11 +20,11 @@ from facesynth.evaluation.trajectories import shown_channels, trajectory_figure
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.tuning import PUBLISHED
 
 Spoken = list[tuple[Utterance, Motion]]
 """Tested utterances, each with what was made for it."""
 
-PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 PHONES = (14, 24, 53, 63)
 SECONDS = (221.391, 333.171, 815.719, 942.609)
 SECONDS_GPU = (50.828, 90.891, 232.078, 256.484)

@@ -15,6 +15,7 @@ from facesynth.face.rig.arkit import BLINKS
 from facesynth.face.rig.arkit_rig import Rig, pose
 from facesynth.face.rig.markers import marker_layout, marker_vertices
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -22,8 +23,6 @@ from facesynth.motion.resample import resample
 
 DEFORMERS = {"distance": MeshDistanceDeformer, "regions": RegionDeformer}
 """Ways from markers to a mesh, by the name that people choose them with."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

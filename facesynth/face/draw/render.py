@@ -14,19 +14,80 @@ from scipy.spatial.transform import Rotation
 from facesynth.face.draw.bake import built_in_look
 from facesynth.face.draw.camera import Camera
 from facesynth.face.draw.light import KEY
-from facesynth.face.draw.look import Eyeball, Look
-from facesynth.face.draw.occlusion import orthographic
-from facesynth.face.draw.own_look import own_look
+from facesynth.face.draw.look import Eyeball, LitSphere, Look
+from facesynth.face.draw.occlusion import orthographic, sky_visibility
 from facesynth.face.draw.raster import FAR, TILE, bin_segments, bin_triangles, draw_depth, nearest_first, vertex_normals
-from facesynth.face.draw.shading import HIDDEN, OPEN_MM, Shot
+from facesynth.face.draw.shading import HIDDEN, OPEN_MM, SKIN, Shot, Surface
 from facesynth.face.draw.shadow import with_bounds
 from facesynth.face.draw.strands import Strands
-from facesynth.face.draw.studio import backdrop, display_curve
 from facesynth.face.draw.tiles import NO_HAIR, Bins, Hair, draw_tiles, light_hair
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.own_head import OwnHead
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.progress import track
+
+
+def backdrop(width: int, height: int) -> NDArray[np.float32]:
+    """[height, width, 3] a grey studio wall, brighter behind the lit side, with a little noise against banding."""
+    y, x = np.mgrid[0:height, 0:width] / float(height)
+    distance = np.hypot((x - 0.42 * width / height) * 1.0, (y - 0.40) * 1.15)
+    glow = 0.20 * np.exp(-((distance / 0.75) ** 2)) + 0.036
+    grain = np.random.default_rng(7).normal(0, 0.0012, (height, width))
+    return ((glow + grain)[..., None] * np.array([0.92, 0.97, 1.06])).clip(0).astype(np.float32)
+
+
+def display_curve(steps: int = 16384) -> NDArray[np.uint8]:
+    """[steps] display value of linear light 0..4: a shoulder that keeps highlights, then the sRGB curve."""
+    linear = (np.arange(steps) + 0.5) * 4 / steps
+    mapped = 0.80 * linear * (1 + linear / 12.0) / (1 + 0.42 * linear)
+    encoded = np.where(mapped <= 0.0031308, 12.92 * mapped, 1.055 * np.maximum(mapped, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.round(255 * np.clip(encoded, 0, 1)).astype(np.uint8)
+
+
+GLOSS = 0.35
+OPEN_JAW = 0.45
+_WHOLE_HEAD = 2.1
+"""Height of the picture over that of what the face's shapes move."""
+_WELD_MM = 1e-3
+
+
+def own_look(head: OwnHead) -> Look:
+    """Colours as the head's file has them; every vertex as bright as the sky it sees with the jaw shut or open."""
+    quads = np.ascontiguousarray(head.triangles[:, [0, 1, 2, 2]], np.int32)
+    welded = _welded(head.rest_mm)
+    texture = np.empty((*head.colours.shape[:3], 4), np.uint8)
+    texture[..., :3] = np.round(255 * np.sqrt(np.clip(head.colours, 0, 1)))
+    texture[..., 3] = round(255 * GLOSS)
+    occlusion = np.max([_sky_over(head, quads, welded, value) for value in (0.0, OPEN_JAW)], axis=0)
+    open_sky = np.ones(len(head.rest_mm), np.float32)
+    surface = Surface(quads, np.full(len(quads), SKIN, np.uint8), head.rest_mm, occlusion, open_sky, texture)
+    reach_mm = float(np.linalg.norm(head.face_mm[1] - head.face_mm[0]))
+    return Look(surface, LitSphere(np.zeros(3), reach_mm), framing(head), welded=welded)
+
+
+def framing(head: OwnHead) -> Camera:
+    """A camera that sees the whole head from the front."""
+    height_mm = _WHOLE_HEAD * float(head.face_mm[1, 1] - head.face_mm[0, 1])
+    far_mm = height_mm / 2 / np.tan(np.radians(Camera.field_of_view_deg) / 2)
+    return Camera((0.0, 0.0, float(head.face_mm[1, 2]) + far_mm), (0.0, 0.0, 0.0))
+
+
+def _sky_over(head: OwnHead, quads: NDArray[np.int32], welded: NDArray[np.int64], jaw_open: float) -> NDArray[np.float32]:
+    """[V] what each vertex sees of the sky: teeth do so when the jaw is open."""
+    weights = np.zeros((1, len(ARKIT_NAMES)))
+    weights[0, ARKIT_NAMES.index("jawOpen")] = jaw_open
+    posed = head.posed(head.map.own(weights)[0] - head.map.own(0 * weights)[0])
+    normal = vertex_normals(posed, welded[quads].astype(np.int32))[welded]
+    return sky_visibility(posed, normal, quads, directions=48)
+
+
+def _welded(vertices: NDArray[np.float32]) -> NDArray[np.int64]:
+    """[V] the first vertex at the same place: files split vertices at seams, which must not show in the light."""
+    places = np.round(vertices / _WELD_MM).astype(np.int64)
+    _, first, inverse = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    return first[np.ravel(inverse)]
+
 
 _SHADOW_SIZE = 512
 _STRAND_BUCKETS = 4096

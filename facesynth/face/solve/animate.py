@@ -1,23 +1,93 @@
 """From a motion to an animation of the built-in head."""
 
+from collections.abc import Mapping
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import EyeMotion, quiet_eyes
-from facesynth.face.behaviour.tongue import TIP_OUT, TIP_UP, tongue_track
 from facesynth.face.rig.arkit import BLINKS, arkit_columns, gaze_of, gaze_weights
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
-from facesynth.face.rig.markers import LipGap, marker_vertices
+from facesynth.face.rig.markers import MIDDLE_LIPS, LipGap, marker_vertices
 from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
 from facesynth.face.solve.closures import with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
-from facesynth.face.solve.mouth import amplified, close_within_jaw
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.pose import rigid_points
+
+# On ARKit's heads mouthClose undoes jawOpen at the lips: more of it than of the jaw drives one lip through the other.
+MOUTH = tuple(i for i, name in enumerate(ARKIT_NAMES) if name.startswith(("jaw", "mouth", "tongue")))
+JAW, CLOSE = ARKIT_NAMES.index("jawOpen"), ARKIT_NAMES.index("mouthClose")
+SHUT_MM, OPEN_MM = 0.7, 2.0
+"""Lips nearer than the first are shut and stay as near; wider than the second they are free; between, less and less."""
+
+
+# The gaps of the lips are linear in the weights: times g, a gap becomes r + g (gap - r), with r the gap at rest. For g < 1 that
+# brings shut lips nearer to rest, where they are shut as well; a larger g would drive them apart or through each other, so it
+# fades to 1 as the lips come together.
+def amplified(weights: ArrayLike, gain: float, lips: LipGap) -> NDArray[np.float64]:
+    """Weights [T, 52] with the mouth's times `gain`, in 0..1; lips that were shut stay shut, and none pass through each other."""
+    if not (np.isfinite(gain) and gain >= 0):
+        raise FacesynthError(f"a gain of the mouth must be 0 (still) or a positive factor; got {gain}")
+    values = np.clip(np.asarray(weights, np.float64), 0, 1)
+    if gain > 1:
+        free = np.clip((lips.opening_mm(values) - SHUT_MM) / (OPEN_MM - SHUT_MM), 0, 1)
+        values[:, MOUTH] *= 1 + (gain - 1) * free[:, None]
+        values[:, [JAW, CLOSE]] /= np.maximum(values[:, [JAW, CLOSE]].max(axis=1, keepdims=True), 1.0)
+        moved = free > 0
+        values[np.ix_(moved, np.array(MOUTH))] = with_lips_apart(values[moved], lips)[:, MOUTH]
+        return np.clip(values, 0, 1)
+    values[:, MOUTH] *= gain
+    return values
+
+
+# What mouthClose closes beyond the jaw, the shapes that part the lips give way to: with m = excess · |slope of mouthClose| and
+# p = Σ slope · weight of those shapes, their weights become (1 - m / p) of what they were.
+def close_within_jaw(weights: ArrayLike, lips: LipGap) -> NDArray[np.float64]:
+    """Weights [T, 52] whose mouthClose is nowhere above jawOpen, with lips as near as they were."""
+    values = np.array(weights, np.float64)
+    excess = np.maximum(values[:, CLOSE] - values[:, JAW], 0)
+    values[:, CLOSE] -= excess
+    slopes_mm = lips.slopes_mm[MIDDLE_LIPS].mean(axis=0)
+    parting = [i for i in np.flatnonzero(slopes_mm > 0) if i != JAW]
+    open_mm = values[:, parting] @ slopes_mm[parting]
+    missing_mm = excess * -slopes_mm[CLOSE]
+    values[:, parting] *= 1 - np.clip(missing_mm / np.maximum(open_mm, 1e-9), 0, 1)[:, None]
+    return values
+
+
+TIP_UP: Mapping[str, float] = {
+    **dict.fromkeys(["t", "d", "n", "en", "l", "el"], 1.0),
+    **dict.fromkeys(["s", "z"], 0.7),
+    "r": 0.6,
+    **dict.fromkeys(["th", "dh", "er", "y"], 0.5),
+    **dict.fromkeys(["sh", "zh", "ch", "jh", "iy", "ey"], 0.4),
+    **dict.fromkeys(["ih", "ay", "oy"], 0.3),
+    "eh": 0.2,
+    **dict.fromkeys(["ae", "ah", "ax", "k", "g", "ng"], 0.1),
+}
+"""How far the tip is lifted, 0..1; 0 where a phone is not listed."""
+
+TIP_OUT: Mapping[str, float] = {"th": 0.34, "dh": 0.34, "l": 0.06, "el": 0.06}
+"""Weight of tongueOut."""
+
+SMOOTHING_S = 0.022
+"""Standard deviation of the Gaussian between one target and the next."""
+
+
+def tongue_track(targets: Mapping[str, float], phones: PhoneTrack | None, count: int, fps: float) -> NDArray[np.float64]:
+    """[T] a target per phone as a smooth curve; zeros without phones."""
+    if phones is None:
+        return np.zeros(count)
+    phone = np.searchsorted(phones.ends_s, (np.arange(count) + 0.5) / fps, side="right")
+    heights = np.array([targets.get(label, 0.0) for label in phones.labels] + [0.0])  # nothing after the last phone
+    return gaussian_filter1d(heights[phone], SMOOTHING_S * fps, mode="nearest")
+
 
 ALREADY_BLINKS = 0.5
 """A motion whose lids shut this far has blinks of its own."""

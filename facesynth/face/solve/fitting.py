@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import HEAD_MARKERS, INNER_LIPS, marker_layout
 from facesynth.face.solve.landmark_names import KNOWN_POINTS, LANDMARKS
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.lips import lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.motion.arkit_names import ARKIT_NAMES
-
-Floats = NDArray[np.float64]
 
 ENOUGH_NAMES = 12
 """From so many known points on, the others are left out: they would not move as surely."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import Tensor, nn
 
 from facesynth.face.animation import FaceAnimation
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -30,8 +31,6 @@ RBF_RIDGE = 0.1
 """Share of the mean diagonal that is added to it: weights set by hand are off by a tenth, and are not met exactly."""
 SAME_POSE = 1e-3
 """Frames are the same pose where they are nearer than this share of the median distance."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..filters import gaussian
 from ..warp import time_warp
 from .audio_cost import warp_path, warp_paths
 from .candidates import Candidates, Chooser
-from .graph import Floats, Ints
 from .plan import Plan, Wish
 
 VELOCITY_LASTS_S = 0.04

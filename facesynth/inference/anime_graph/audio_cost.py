@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .graph import Floats, Ints
+from ..arrays import Floats, Ints
 
 MOST_CELLS = 1 << 22
 """Numbers that a batch of warps may hold at once."""

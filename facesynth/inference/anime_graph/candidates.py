@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..warp import stretched
 from .audio_cost import audio_costs
-from .graph import Floats, Graph, Ints
+from .graph import Graph
 from .search import Step
 
 AS_RECORDED = -1

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Floats
+from ..checks import require_layout
 from ..closures import keep_shut
 from ..emotion_track import felt_over
 from ..errors import FacesynthError, unknown
@@ -12,7 +14,6 @@ from ..layout import Layout
 from ..motion import Motion
 from ..speech import NEUTRAL, Speech
 from .candidates import Maps
-from .graph import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class EmotionMapper:
         hold stays, lips that were shut stay shut, and frames with missing samples stay missing.
         """
         number = self.number(source, target)
-        self._require_layout(motion.layout)
+        require_layout(motion.layout, self.layout, "maps")
         if number is None:
             return motion
         frames = motion.frames.astype(np.float64)
@@ -78,10 +79,3 @@ class EmotionMapper:
         if pair not in self.maps.pairs:
             raise FacesynthError(self.no_map.get(f"{source} {target}", f"no map leads from {source} to {target}"))
         return self.maps.pairs.index(pair)
-
-    def _require_layout(self, got: Layout) -> None:
-        if (got.kind, got.names) != (self.layout.kind, self.layout.names):
-            raise FacesynthError(
-                f"this model maps motion of its own layout ({len(self.layout.names)} {self.layout.kind}); "
-                f"got {len(got.names)} {got.kind} with other names"
-            )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..arrays import Floats
 from ..errors import FacesynthError
 from ..expectation import exported_bands, exported_expectation
 from ..folder import Folder
@@ -12,7 +13,7 @@ from ..sound import resample
 from ..speech import Speech
 from .candidates import Chooser, Maps
 from .emotions import EmotionMapper
-from .graph import Floats, Graph
+from .graph import Graph
 from .hearing import RATE, Ear
 from .lowpass import LowPass
 from .model import AnimeGraph

@@ -7,10 +7,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..phones import VISEMES
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 VISEME_OF = np.array(VISEMES)
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Ints
 from ..checks import checked_piece
 from ..errors import FacesynthError
 from ..speech import PhoneTrack
-from .graph import Floats, Ints
 
 RATE = 16000
 HOP, WINDOW = 160, 400

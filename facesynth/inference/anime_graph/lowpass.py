@@ -4,8 +4,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..arrays import Floats
 from ..filters import butterworth, forth_and_back
-from .graph import Floats
 
 ORDER = 6
 """Order of the Butterworth filter, which runs forth and back."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..checks import checked_rate
 from ..closures import close_at
 from ..errors import FacesynthError, reject_options, unknown
@@ -20,7 +21,7 @@ from ..speech import Speech
 from .assembly import blend, mean_motion
 from .candidates import Chooser
 from .emotions import EmotionMapper
-from .graph import Floats, Graph, Ints
+from .graph import Graph
 from .hearing import RATE, Ear, ranges, require_sound
 from .lowpass import LowPass
 from .plan import Plan, Wish, explain, make_plan, shares_of_others

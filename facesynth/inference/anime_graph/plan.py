@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..phones import PHONES
 from .candidates import Candidates, Chooser, make_step
-from .graph import VISEME_OF, Floats, Graph, Ints
+from .graph import VISEME_OF, Graph
 from .search import NUMPY, PathSearch, Step, Weights, jumps, look_ahead_path, path_cost
 
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FacesynthError
 from ..posterior import posterior
-from .graph import Floats, Ints
 
 
 @dataclass(frozen=True)

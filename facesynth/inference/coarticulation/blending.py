@@ -9,13 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..phones import SILENCE
 from ..speech import PhoneTrack
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SETTLE_S, WAKE_S = 0.25, 0.2
 """A pause longer than both rests from the first after its start until the second before its end, s."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..closures import close_at, closing_frames
 from ..errors import FacesynthError, reject_options
 from ..filters import gaussian
@@ -17,7 +18,7 @@ from ..lips import bilabial_spans, has_lips
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONE_INDEX, PHONES, VISEMES, viseme_of
 from ..speech import PhoneTrack, Speech
-from .blending import Floats, Ints, KeyShapes, WeightModels, blend_key_shapes
+from .blending import KeyShapes, WeightModels, blend_key_shapes
 
 SMOOTHING_S = 0.02
 """Standard deviation of the smoothing over the joints of models, which need not meet."""

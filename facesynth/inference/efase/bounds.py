@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Weights
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.steps import step_terms
 
 TABLES = ("bounds_in", "bounds_out", "bounds_scale")

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Ints
 from ..efase.bounds import NONE, TABLES, class_order, class_starts, coded, steps_within
 from ..efase.costs import Weights
-from ..efase.nodes import Ints, Nodes
+from ..efase.nodes import Nodes
 
 Codes = NDArray[np.uint8]
 Rows = dict[tuple[int, int], Codes]

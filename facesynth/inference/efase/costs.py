@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.nodes import Floats, Ints, Nodes
+from ..arrays import Floats, Ints
+from ..efase.nodes import Nodes
 
 
 @dataclass(frozen=True)

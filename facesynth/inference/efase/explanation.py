@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Query, Weights, target_costs
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.steps import end_vectors, start_vectors, step_costs, step_terms
 from ..phones import PHONES, SILENCE
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.nodes import Floats, Ints, Nodes
+from ..arrays import Floats, Ints
+from ..efase.nodes import Nodes
 from ..efase.steps import squared_distances
 from ..expectation import Bands, Expectation, Said, Single, Standard
 from ..phones import PHONES, SILENCE

@@ -10,9 +10,10 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Query, Weights
 from ..efase.hearing import Heard, Hearing
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.search import Search, SearchIndex
 from ..efase.steps import step_matrix
 from ..expectation import Single

@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..closures import close_lips
 from ..efase.assembly import Smoothing, blend, concatenate, joints
 from ..efase.costs import Query, Weights, all_targets
 from ..efase.explanation import explain, shares
 from ..efase.hearing import Heard, Hearing
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.plan import Plan, Solved, plan_speech
 from ..efase.search import Engine, SearchIndex, Stretch
-from ..efase.soft import StepMatrix, soft_search
+from ..efase.soft import Mix, StepMatrix, soft_search
 from ..efase.steps import path_cost, step_matrix
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
@@ -73,6 +74,8 @@ class Parts:
     """What searches whole stretches; numpy unless another is given."""
     step_matrix: StepMatrix = step_matrix
     """What computes the costs of the steps that a mean over paths needs."""
+    mix: Mix | None = None
+    """What takes means over paths; numpy unless another is given."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that the model came from, if it came from one."""
 
@@ -157,7 +160,7 @@ class Efase:
         cost, mixtures = path_cost(self.nodes, query, path, self.weights), None
         if temperature > 0:
             limit, matrix = self.settings.candidates, self.parts.step_matrix
-            mixtures = soft_search(self.nodes, query, targets, self.weights, path, temperature, limit, matrix)
+            mixtures = soft_search(self.nodes, query, targets, self.weights, path, temperature, limit, matrix, self.parts.mix)
         return Solved(path, cost, mixtures)
 
     def asked(

@@ -8,8 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+from ..arrays import Floats, Ints
 
 COLUMNS = ("starts", "stops", "phones", "visemes", "emotions", "before")
 """Of the table of nodes, in files too."""

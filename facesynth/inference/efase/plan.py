@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Query
-from ..efase.nodes import Floats, Ints
 from ..efase.soft import Mixture
 
 

@@ -24,9 +24,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..efase.bounds import StepBounds, class_order
 from ..efase.costs import Weights
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.steps import end_vectors, squared_distances, start_vectors, step_costs
 from ..errors import FacesynthError
 

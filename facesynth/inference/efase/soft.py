@@ -10,8 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Query, Weights
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..efase.steps import step_matrix
 from ..posterior import posterior
 from ..warp import stretched
@@ -31,6 +32,8 @@ class Mixture:
 
 StepMatrix = Callable[[Nodes, Ints, Ints, Weights], Floats]
 """What `step_matrix` does, or remembers of it."""
+Mix = Callable[[Sequence[Ints], Sequence[Floats], float], list[Mixture]]
+"""Mixtures of candidates [n_t] at T phones, by their target costs [n_t] and a temperature."""
 
 
 def soft_search(
@@ -42,10 +45,17 @@ def soft_search(
     temperature: float,
     limit: int,
     matrix: StepMatrix = step_matrix,
+    mix: Mix | None = None,
 ) -> list[Mixture]:
-    """A mixture of nodes for each phone. targets [T, N]; `path` [T], the cheapest one, is always among the candidates."""
+    """A mixture of nodes for each phone. targets [T, N]; `path` [T], the cheapest one, is always among the candidates.
+
+    The means over paths are taken by `mix`, where it is given, or by numpy over the costs that `matrix` gives.
+    """
     chosen = candidates(nodes, query, targets, weights, path, limit)
-    scores = [-target[which] / temperature for target, which in zip(targets, chosen, strict=True)]
+    costs = [target[which] for target, which in zip(targets, chosen, strict=True)]
+    if mix is not None:
+        return mix(chosen, costs, temperature)
+    scores = [-cost / temperature for cost in costs]
     moves = [-matrix(nodes, i, j, weights) / temperature for i, j in pairwise(chosen)]
     found, captured = posterior(scores, moves), [0.0]
     for t, (here, there) in enumerate(pairwise(chosen)):

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..efase.costs import Query, Weights, target_costs
-from ..efase.nodes import Floats, Ints, Nodes
+from ..efase.nodes import Nodes
 from ..products import product
 from ..warp import stretched
 

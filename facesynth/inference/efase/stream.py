@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Ints
 from ..efase.assembly import SETTLE_S, WAKE_S
 from ..efase.costs import target_costs
-from ..efase.nodes import Ints
 from ..efase.plan import Plan
 from ..efase.search import Stretch
 from ..efase.window import frames_between

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..efase.nodes import Ints
+from ..arrays import Ints
 from ..efase.plan import Plan
 from ..filters import at_rate
 from ..phones import SILENCE

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..checks import checked_audio, checked_seed
 from ..errors import reject_options
 from ..layout import Layout
@@ -25,8 +26,6 @@ from ..sound import resample
 from ..windows import FrameWindows
 from .voice import pitch_windows, prosody_of
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 HEARD_FPS = 60.0
 """Prosody frames a second: windows of 25 ms that overlap by 8.3 ms."""
 KEYS_PER_S = 6.0

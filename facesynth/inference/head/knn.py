@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats, Ints
 from ..checks import checked_audio, checked_piece, checked_rate, require_open
 from ..errors import FacesynthError, reject_options
 from ..layout import Layout
@@ -17,7 +18,7 @@ from ..sound import resample
 from ..windows import FrameWindows
 from .keys import HeadKeys
 from .neighbours import Neighbours
-from .search import Candidates, Floats, Ints, PathSearch, Scales, best_paths, poses_along
+from .search import Candidates, PathSearch, Scales, best_paths, poses_along
 from .voice import pitch_windows, voice_features
 
 MOST_FRAMES = 4096

@@ -1,12 +1,10 @@
 """The nearest points of a set, exactly: a k-d partition, of which the leaves with the nearest boxes are searched."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Floats, Ints
 from ..errors import FacesynthError
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 LEAF = 64
 """Largest number of points in a leaf."""
 

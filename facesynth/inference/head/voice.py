@@ -5,10 +5,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Floats
 from ..pitch import HIGHEST_HZ, PITCH_WINDOW, RATE, VOICED, pitch_of
 from ..windows import FrameWindows
-
-Floats = NDArray[np.float64]
 
 WINDOW_S = 0.030
 """Of the 31 features."""

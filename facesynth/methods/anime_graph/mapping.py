@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split
@@ -26,8 +27,6 @@ WIDTH_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 RIDGES = (1e-6, 1e-3, 1e-1)
 """Ridges that it tries with each: recordings of one sentence differ from take to take, which is noise to a map."""
 FOLDS = 4
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,13 @@ from torch import nn
 from facesynth.corpus import Corpus
 from facesynth.inference.anime_graph.candidates import Chooser, Maps
 from facesynth.inference.anime_graph.emotions import EmotionMapper
-from facesynth.inference.anime_graph.graph import Floats, Graph, Ints
+from facesynth.inference.anime_graph.graph import Graph
 from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.anime_graph.model import AnimeGraph as Runtime
 from facesynth.inference.anime_graph.plan import Plan, Wish
 from facesynth.inference.anime_graph.search import NUMPY, Weights
 from facesynth.inference.anime_graph.stream import WishStream
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion

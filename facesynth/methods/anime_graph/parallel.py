@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from facesynth.corpus import Utterance
 from facesynth.inference.anime_graph.audio_cost import warp_path
+from facesynth.inference.arrays import Floats
 from facesynth.methods.anime_graph.components import FaceComponents
 
-Floats = NDArray[np.float64]
 LEAST_FRAMES = 10
 
 

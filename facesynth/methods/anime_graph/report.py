@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.closures import keep_shut
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
@@ -25,8 +26,6 @@ from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split
 from facesynth.motion.rbf import KERNELS, RbfMap
 from facesynth.progress import track
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

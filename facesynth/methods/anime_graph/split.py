@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.components import FaceComponents, block_columns
@@ -24,8 +25,6 @@ MOSTLY_SPEECH = 0.25
 SHUFFLES = 999
 MOST_PAIRS = 60
 """Pairs of one kind that are compared."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from facesynth.inference.anime_graph.graph import Floats, Ints
 from facesynth.inference.anime_graph.search import PathSearch, Step, Weights, path_cost
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.motion.search.cheapest import cheapest
 from facesynth.motion.search.jumps import JumpSteps
 from facesynth.motion.search.posterior import posterior

@@ -3,25 +3,16 @@
 from facesynth.methods.capabilities import Capabilities
 
 HOME = "facesynth.methods.baselines"
-MEAN_FACE = Capabilities(
-    "mean_face", "the mean of what was recorded", home=f"{HOME}.mean_face", hears_phones=False, reference="mean face"
-)
+MEAN_FACE = Capabilities("mean_face", "the mean of what was recorded", home=f"{HOME}.mean_face", reference="mean face")
 PHONE_MEAN = Capabilities("phone_mean", "one pose for each phone", home=f"{HOME}.phone_mean", reference="phone mean")
-RIDGE = Capabilities(
-    "ridge", "a linear map from sound to motion", home=f"{HOME}.ridge", hears_phones=False, minutes=1.0, reference="ridge"
-)
-TCN = Capabilities(
-    "tcn", "a small temporal convolution network", home=f"{HOME}.tcn", hears_phones=False, minutes=3.0, reference="tcn"
-)
-HEAD_REST = Capabilities(
-    "head_rest", "the head rests", home=f"{HOME}.heads", part="head", hears_phones=False, reference="head at rest"
-)
+RIDGE = Capabilities("ridge", "a linear map from sound to motion", home=f"{HOME}.ridge", minutes=1.0, reference="ridge")
+TCN = Capabilities("tcn", "a small temporal convolution network", home=f"{HOME}.tcn", minutes=3.0, reference="tcn")
+HEAD_REST = Capabilities("head_rest", "the head rests", home=f"{HOME}.heads", part="head", reference="head at rest")
 HEAD_RIDGE = Capabilities(
     "head_ridge",
     "a linear map from prosody to the head",
     home=f"{HOME}.heads",
     part="head",
-    hears_phones=False,
     minutes=1.0,
     reference="head by ridge",
 )

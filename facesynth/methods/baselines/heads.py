@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
+from facesynth.inference.arrays import Floats
 from facesynth.inference.head.voice import prosody_of
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import HEAD_REST, HEAD_RIDGE
-from facesynth.methods.learn.heads import Floats, mean_head, poses_of, prosody_windows, still_face, with_head
+from facesynth.methods.learn.heads import mean_head, poses_of, prosody_windows, still_face, with_head
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from facesynth.inference.coarticulation.blending import Floats, KeyShapes, WeightModels
+from facesynth.inference.arrays import Floats
+from facesynth.inference.coarticulation.blending import KeyShapes, WeightModels
 from facesynth.inference.coarticulation.model import CLASS_OF
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout

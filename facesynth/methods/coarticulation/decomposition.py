@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from facesynth.inference.coarticulation.blending import Floats
+from facesynth.inference.arrays import Floats
 
 
 def decompose(frames: Floats, samples: Floats, prior: Floats, stiffness: float) -> Floats:

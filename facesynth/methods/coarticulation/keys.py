@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.inference.coarticulation.blending import Floats, Ints, KeyShapes, pace_of
+from facesynth.inference.arrays import Floats, Ints
+from facesynth.inference.coarticulation.blending import KeyShapes, pace_of
 from facesynth.inference.coarticulation.model import CLASS_OF
 from facesynth.inference.phones import PHONES, VISEME_CLASSES
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.coarticulation.blending import Floats, KeyShapes, WeightModels
+from facesynth.inference.arrays import Floats
+from facesynth.inference.coarticulation.blending import KeyShapes, WeightModels
 from facesynth.inference.coarticulation.model import KEY_FIELDS, MODEL_FIELDS, Parts, as_doubles, weight_models
 from facesynth.inference.coarticulation.model import Coarticulation as Runtime
 from facesynth.inference.errors import FacesynthError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth.corpus import Utterance
-from facesynth.inference.coarticulation.blending import Floats, Ints
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.coarticulation.model import CLASS_OF
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import PhoneTrack

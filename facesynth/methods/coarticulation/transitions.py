@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.inference.coarticulation.blending import Floats, Ints, WeightModels
+from facesynth.inference.arrays import Floats, Ints
+from facesynth.inference.coarticulation.blending import WeightModels
 from facesynth.methods.coarticulation.decomposition import cosine_weights
 
 DEGREE = 3

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, node_name
+from facesynth.inference.arrays import Ints
 from facesynth.inference.efase.hearing import Hearing, PhoneSounds, PoseDistances, phone_spans
-from facesynth.inference.efase.nodes import Ints, Nodes
+from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.learn.expectation import BANDS, PosePredictor
 from facesynth.methods.learn.hearing import Hearing as Bands

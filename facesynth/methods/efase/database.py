@@ -7,7 +7,8 @@ import numpy as np
 import torch
 
 from facesynth.corpus import Corpus, Utterance, node_name
-from facesynth.inference.efase.nodes import Floats, Nodes
+from facesynth.inference.arrays import Floats
+from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, SILENCE, viseme_of

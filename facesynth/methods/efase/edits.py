@@ -12,9 +12,10 @@ import numpy as np
 import torch
 
 from facesynth.corpus.journal import AddedNode, Edits, Journal
+from facesynth.inference.arrays import Ints
 from facesynth.inference.efase.editing import EfaseDraft, EfaseEditor
 from facesynth.inference.efase.kept import Memory
-from facesynth.inference.efase.nodes import COLUMNS, Ints, Nodes
+from facesynth.inference.efase.nodes import COLUMNS, Nodes
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, SILENCE, viseme_of

@@ -16,8 +16,9 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.efase.costs import Query, all_targets
-from facesynth.inference.efase.nodes import Floats, Ints, Nodes
+from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.plan import stretches
 from facesynth.inference.efase.soft import candidates
 from facesynth.inference.efase.steps import StepTerms, step_terms

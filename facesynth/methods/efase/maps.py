@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.efase.nodes import Ints, Nodes
+from facesynth.inference.arrays import Ints
+from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.errors import unknown
 from facesynth.inference.phones import PHONES, SILENCE
 from facesynth.motion.maps.phone_map import Cluster, PhoneMap

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.journal import Edits
+from facesynth.inference.arrays import Ints
 from facesynth.inference.efase.assembly import Smoothing
 from facesynth.inference.efase.bounds import TABLES, step_bounds
 from facesynth.inference.efase.changed_bounds import changed_bounds
@@ -18,9 +19,8 @@ from facesynth.inference.efase.costs import Query, Weights
 from facesynth.inference.efase.hearing import Heard
 from facesynth.inference.efase.model import Efase as Speaker
 from facesynth.inference.efase.model import Parts, Settings
-from facesynth.inference.efase.nodes import COLUMNS, Ints, Nodes
+from facesynth.inference.efase.nodes import COLUMNS, Nodes
 from facesynth.inference.efase.plan import Plan
-from facesynth.inference.efase.search import Engine
 from facesynth.inference.efase.stream import EfaseStream
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
@@ -33,7 +33,7 @@ from facesynth.methods.efase.database import build_database
 from facesynth.methods.efase.edits import Changed, EditsEditor, changed_nodes, edits_key
 from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, map_beside, mapped_phones, places_of_all
 from facesynth.methods.efase.penalty import median_transition
-from facesynth.methods.efase.torch_search import torch_engine
+from facesynth.methods.efase.torch_search import torch_engine, torch_mix
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.maps.phone_map import Kind, PhoneMap
@@ -209,7 +209,7 @@ class Efase(Method):
                     settings=self.settings(),
                     decode=self._decode,
                     hearing=self.audio.heard_by(nodes, self.audio_weights()),
-                    engine=self._engine(),
+                    **self._search(),
                 )
             )
         return self._speaker
@@ -241,20 +241,16 @@ class Efase(Method):
         self,
         speech: Speech,
         *,
-        seed: int = 0,
-        fps: float | None = None,
         constraints: Mapping[int, str] | None = None,
         edits: Edits | None = None,
         look_ahead: int | None = None,
         **options: Any,
     ) -> Motion:
-        """Motion at `fps` (the corpus's rate unless given); constraints: phone index -> node name.
+        """Motion under constraints, phone index -> node name; `fps` and the rest as in `inference.efase.model`.
 
-        edits: nodes that must not be used, and drawn ones that may be. look_ahead: settle each phone when that many more
-        are known, as a stream does. See `inference.efase.model`.
+        edits: nodes that must not be used, and drawn ones that may be.
         """
-        speaker = self.edited(edits).speaker
-        return speaker.synthesize(speech, seed=seed, fps=fps, constraints=constraints, look_ahead=look_ahead, **options)
+        return self.edited(edits).speaker.synthesize(speech, constraints=constraints, look_ahead=look_ahead, **options)
 
     def stream(self, *, look_ahead: int | None = None, weakened: bool = False, fps: float | None = None) -> EfaseStream:
         """Phones one by one, frames as soon as they are final; see `inference.efase.model`."""
@@ -353,10 +349,10 @@ class Efase(Method):
         """Nodes, their names, the emotions, the rate of the frames (Hz), and what decodes them."""
         return self.nodes(), self.facts["names"], self.emotions, self.config["database_fps"], self._decode
 
-    def _engine(self) -> Engine | None:
-        """On another device than the processor, the search by tensors there."""
-        device = self.node_frames.device
-        return None if device.type == "cpu" else torch_engine(self.nodes(), self.weights(), device)
+    def _search(self) -> dict[str, Any]:
+        """On another device than the processor, the searches by tensors there."""
+        device, of = self.node_frames.device, (self.nodes(), self.weights())
+        return {} if device.type == "cpu" else {"engine": torch_engine(*of, device), "mix": torch_mix(*of, device)}
 
     def _decode(self, coordinates: NDArray[np.float32]) -> NDArray[np.float32]:
         frames: NDArray[np.float32] = self.pca.decode(torch.from_numpy(coordinates).to(self.pca.mean.device)).cpu().numpy()

@@ -22,7 +22,7 @@ import torch
 from tqdm import tqdm
 
 from facesynth.corpus import Corpus, Record, Utterance
-from facesynth.inference.efase.nodes import Floats
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
 from facesynth.motion.resample import resample

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.inference.contours import Floats
+from facesynth.inference.arrays import Floats
 from facesynth.inference.emotion import FRONT_ENDS, SMALLEST_SPREAD, EmotionReader, ReaderSettings, Reading, beside_own_average
 from facesynth.inference.emotion_track import HOP_S, WINDOW_S, track_of
 from facesynth.inference.errors import FacesynthError, unknown
@@ -67,7 +67,10 @@ class DetectorSettings:
 
 
 class EmotionDetector(nn.Module):
-    """Features, scaling and a support vector machine."""
+    """Features, scaling and a support vector machine.
+
+    No `Method`: it learns from labelled sounds and gives emotions, where methods learn from a corpus and give motion.
+    """
 
     name = "emotion"
     """As methods have one: in model files and in exported folders."""
@@ -110,13 +113,14 @@ class EmotionDetector(nn.Module):
         speakers = np.array([clip.speaker for clip in clips])
         if self.settings.normalise:
             x = by_speaker(x, speakers)
-        self._fit_scaling(x)
         y = np.array([emotions.index(clip.emotion) for clip in clips])
         groups = speakers if len(set(speakers.tolist())) > 1 else np.array([clip.sentence for clip in clips])
         chosen = {f.name: getattr(self.settings, f.name) for f in fields(SvmSettings)}
+        device = self._device
+        self._fit_scaling(x)
         self.machine = Svm.fit(self._scaled(torch.from_numpy(x)).numpy(), y, SvmSettings(**chosen), groups)
         self.emotions = tuple(emotions)
-        return self.eval()
+        return self.to(device).eval()
 
     def _fit_scaling(self, x: NDArray[np.float64]) -> None:
         """The paper's features to [-1, 1]; the voice's, of many shapes, to mean 0 and spread 1."""
@@ -171,8 +175,11 @@ class EmotionDetector(nn.Module):
 
     def _listening(self) -> EmotionReader:
         settings = ReaderSettings(self.settings.features, self.settings.normalise, RATE)
-        device = next((buffer.device for buffer in self.buffers()), torch.device("cpu"))
-        return EmotionReader(self.emotions, settings, part(self._front, device), part(self.judge, device))
+        return EmotionReader(self.emotions, settings, part(self._front, self._device), part(self.judge, self._device))
+
+    @property
+    def _device(self) -> torch.device:
+        return next((buffer.device for buffer in self.buffers()), torch.device("cpu"))
 
     def _front(self, audio: Tensor) -> Sequence[Tensor]:
         found = self.front(audio.double())

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Utterance
+from facesynth.inference.arrays import Floats
 from facesynth.inference.layout import Layout
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import NEUTRAL, PhoneTrack
 
-Floats = NDArray[np.float64]
 APART_S = 1e-6
 """Two moments of one recording that are one in the other are so far apart, s."""
 

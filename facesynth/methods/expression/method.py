@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.expression import Expression as Runtime
 from facesynth.inference.expression import Parts, patch_settings
@@ -15,7 +16,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.phone_context import CONTEXT, context_of
 from facesynth.inference.speech import NEUTRAL, Speech
 from facesynth.methods.expression.capabilities import CAPABILITIES
-from facesynth.methods.expression.differences import Difference, Floats, difference_of, says_the_same, twins, whole_runs
+from facesynth.methods.expression.differences import Difference, difference_of, says_the_same, twins, whole_runs
 from facesynth.methods.learn.frames import PoseSum, mean_pose
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.method import Method

@@ -8,7 +8,6 @@ CAPABILITIES = Capabilities(
     home="facesynth.methods.eyes.method",
     part="eyes",
     abilities=frozenset({Accounting, Looking}),
-    hears_phones=False,
     minutes=1.0,
     exporter="facesynth.export.eyes:eyes_content",
 )

@@ -9,9 +9,10 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.eyes import recorded_eyes
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.eyes import Eyes as Runtime
-from facesynth.inference.eyes import Floats, Parts
+from facesynth.inference.eyes import Parts
 from facesynth.inference.motion import Motion
 from facesynth.inference.patches import PatchSettings, PatchTexture
 from facesynth.inference.speech import Speech

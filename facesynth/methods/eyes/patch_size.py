@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.eyes import Floats
+from facesynth.inference.arrays import Floats
 from facesynth.inference.gaze import gaze_shifts
 
 SHUT = 0.2

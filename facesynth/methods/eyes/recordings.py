@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.inference.eyes import Floats
+from facesynth.inference.arrays import Floats
 from facesynth.inference.gaze import quick, quick_turns
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import runs

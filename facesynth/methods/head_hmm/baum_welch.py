@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.methods.head_hmm.codebook import codebook
 
-Floats = NDArray[np.float64]
 SMALLEST_VARIANCE = 0.02
 """Of a Gaussian, in units of the features' variance: few frames must not make a needle."""
 LEAST_WEIGHT = 1e-6

@@ -7,7 +7,6 @@ CAPABILITIES = Capabilities(
     "head turns from prosody, by a hidden Markov model for each cluster of rotations (Deng 2006, §4.4)",
     home="facesynth.methods.head_hmm.method",
     part="head",
-    hears_phones=False,
     minutes=2.0,
     exporter="facesynth.export.head:hmm_content",
 )

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from facesynth.inference.arrays import Floats, Ints
+
 SPLIT = 0.01
 """The second half of a cell begins so many standard deviations beside its mean."""
 SETTLED = 1e-4

@@ -5,10 +5,10 @@ from typing import Any, Self
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.head.hmm import HEARD_FPS, HeadHmm, Network
 from facesynth.inference.head.voice import prosody_of
@@ -22,8 +22,6 @@ from facesynth.methods.method import Method
 from facesynth.methods.parts import part
 from facesynth.methods.registry import register
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 UNSEEN = 0.1
 """So often every step from cluster to cluster counts as seen before any is counted."""
 

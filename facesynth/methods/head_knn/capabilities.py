@@ -17,7 +17,6 @@ CAPABILITIES = Capabilities(
             reader="facesynth.inference.head.keys:read_head_keys",
         ),
     ),
-    hears_phones=False,
     minutes=1.0,
     exporter="facesynth.export.head:knn_content",
 )

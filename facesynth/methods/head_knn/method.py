@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.head.keys import HeadKeys
 from facesynth.inference.head.knn import HeadKnn, HeadKnnStream, KnnSettings, Recorded
-from facesynth.inference.head.search import Candidates, Floats, Ints, Scales
+from facesynth.inference.head.search import Candidates, Scales
 from facesynth.inference.head.voice import FEATURES, voice_features
 from facesynth.inference.motion import Motion
 from facesynth.inference.pitch import RATE

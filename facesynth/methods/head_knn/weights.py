@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facesynth.inference.head.search import Candidates, Floats, Scales, best_paths, poses_along
+from facesynth.inference.arrays import Floats
+from facesynth.inference.head.search import Candidates, Scales, best_paths, poses_along
 
 STEP = 0.05
 MOST_STEPS = 25

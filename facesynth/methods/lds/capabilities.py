@@ -7,7 +7,6 @@ CAPABILITIES = Capabilities(
     "a linear dynamical system driven by sound, with random motion of its own (Saisan 2004)",
     home="facesynth.methods.lds.method",
     options=(Option("noise", float, "Amount of random motion; 1 as recorded, 0 none.", least=0),),
-    hears_phones=False,
     minutes=1.0,
     exporter="facesynth.export.lds:lds_content",
 )

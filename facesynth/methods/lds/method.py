@@ -12,10 +12,9 @@ from facesynth.inference.lds import Lds, LdsSettings, LdsStream
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.lds.capabilities import CAPABILITIES
-from facesynth.methods.lds.features import Standardised
 from facesynth.methods.lds.identification import fitting_rows, identify
 from facesynth.methods.lds.innovations import Innovations, innovations_of
-from facesynth.methods.lds.recordings import Piece, periodograms, pieces_of
+from facesynth.methods.lds.recordings import Piece, Standardised, periodograms, pieces_of
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, plain
 from facesynth.methods.lds.system import Array, Clip, LinearSystem

@@ -1,23 +1,127 @@
 """What a user left to be chosen: the lead of the sound and the numbers of states, by the error on clips left out."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from facesynth.methods.lds.deterministic import fit_inputs, observability, shift_invariance, stabilised
 from facesynth.methods.lds.identification import fitting_rows
-from facesynth.methods.lds.orders import (
-    Choice,
-    Fold,
-    deterministic_errors,
-    folds,
-    no_change_error,
-    plainest_good,
-    stochastic_errors,
-)
-from facesynth.methods.lds.stochastic import noise_rows
-from facesynth.methods.lds.system import Array, Clip
+from facesynth.methods.lds.stochastic import noise_rows, predictor_space, realise
+from facesynth.methods.lds.system import Array, Clip, Deterministic
 from facesynth.progress import track
+
+FOLDS = 4
+MOST_FRAMES = 6_000
+"""Of longer recordings, evenly spaced clips with about this many frames decide."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Candidates, their held-out errors, and the one chosen."""
+
+    candidates: tuple[float, ...]
+    errors: tuple[float, ...]
+    """Mean squared held-out error of each candidate, in the shape's unit squared, summed over components."""
+    chosen: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Clips to learn from and clips to judge by."""
+
+    train: tuple[Clip, ...]
+    test: tuple[Clip, ...]
+
+
+def folds(clips: Sequence[Clip], sentences: Sequence[str], rows: int) -> list[Fold]:
+    """Up to four folds by sentence; a recording with fewer sentences than two is cut in time."""
+    clips, sentences = _thinned(clips, sentences)
+    if len(set(sentences)) < 2:
+        clips = [piece for clip in clips for piece in _cut(clip, max(len(clip.u) // (2 * FOLDS), 4 * rows))]
+        sentences = [str(i) for i in range(len(clips))]
+    number = {sentence: i % FOLDS for i, sentence in enumerate(sorted(set(sentences)))}
+    which = np.array([number[sentence] for sentence in sentences])
+    return [
+        Fold(
+            tuple(clip for clip, w in zip(clips, which, strict=True) if w != fold),
+            tuple(clip for clip, w in zip(clips, which, strict=True) if w == fold),
+        )
+        for fold in range(which.max() + 1)
+    ]
+
+
+def deterministic_errors(parts: Sequence[Fold], rows: int, orders: Sequence[int], weights: Array) -> Array:
+    """[orders, held-out clips] mean squared error of the simulated output, from state zero.
+
+    `weights` [p] are the squared scales of the shape's components.
+    """
+
+    def judge(fold: Fold) -> Array:
+        gamma, _ = observability(fold.train, rows)
+        models = [_deterministic(fold.train, gamma, order) for order in orders]
+        return np.array([[_mean_square(c.y - model.simulate(c.u), weights) for c in fold.test] for model in models])
+
+    return np.concatenate([judge(fold) for fold in parts], axis=1)
+
+
+def stochastic_errors(parts: Sequence[Fold], rows: int, order: int, orders: Sequence[int], weights: Array) -> Array:
+    """[orders, held-out clips] mean squared error one step ahead, beside a deterministic part of `order` states.
+
+    The first `rows` frames of a clip do not count, while the predictor does not know the clip yet.
+    """
+
+    def judge(fold: Fold) -> Array:
+        gamma, _ = observability(fold.train, rows)
+        model = _deterministic(fold.train, gamma, order)
+        past = noise_rows(sum(len(clip.y) for clip in fold.train), rows, fold.train[0].y.shape[1])
+        rest = [clip.y - model.simulate(clip.u) for clip in fold.train]
+        functionals, _ = predictor_space(rest, past)
+        noises = [realise(rest, past, functionals, candidate)[0] for candidate in orders]
+        left = [(clip.y - model.simulate(clip.u))[:, :, None] for clip in fold.test]
+        return np.array([[_mean_square(noise.innovations(y)[0][rows:, :, 0], weights) for y in left] for noise in noises])
+
+    return np.concatenate([judge(fold) for fold in parts], axis=1)
+
+
+def no_change_error(parts: Sequence[Fold], rows: int, weights: Array) -> float:
+    """What `stochastic_errors` would be of predicting each frame by the one before it."""
+    clips = [clip for fold in parts for clip in fold.test]
+    return float(np.mean([_mean_square(np.diff(clip.y, axis=0)[rows - 1 :], weights) for clip in clips]))
+
+
+def plainest_good(candidates: Sequence[float], errors: Array) -> Choice:
+    """The first candidate, plainest first, within one standard error of the best.
+
+    The standard error is that of the difference to the best over held-out clips [candidates, clips]: how hard a clip
+    is for all candidates says nothing about which is better.
+    """
+    means = errors.mean(axis=1)
+    excess = errors - errors[means.argmin()]
+    spread = excess.std(axis=1, ddof=1) / np.sqrt(errors.shape[1]) if errors.shape[1] > 1 else np.zeros(len(means))
+    first = int(np.argmax(excess.mean(axis=1) <= spread))
+    return Choice(tuple(candidates), tuple(means.tolist()), candidates[first])
+
+
+def _deterministic(clips: Sequence[Clip], gamma: Array, order: int) -> Deterministic:
+    A, C = shift_invariance(gamma, clips[0].y.shape[1], order)
+    return fit_inputs(stabilised(A)[0], C, clips, None)[0]
+
+
+def _mean_square(error: Array, weights: Array) -> float:
+    return float((error**2 @ weights).mean())
+
+
+def _thinned(clips: Sequence[Clip], sentences: Sequence[str]) -> tuple[Sequence[Clip], Sequence[str]]:
+    step = max(1, round(sum(len(clip.u) for clip in clips) / MOST_FRAMES))
+    return (clips, sentences) if len(clips) < 2 * step * FOLDS else (clips[::step], sentences[::step])
+
+
+def _cut(clip: Clip, length: int) -> list[Clip]:
+    count = max(len(clip.u) // length, 1)
+    return [Clip(u, y) for u, y in zip(np.array_split(clip.u, count), np.array_split(clip.y, count), strict=True)]
+
 
 Auto = Literal["auto"]
 LEADS_MS = (0.0, 40.0, -40.0, 80.0, 120.0, 160.0)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
@@ -133,20 +132,9 @@ def propagate(A: Array, drive: Array, start: Array) -> tuple[Array, Array]:
     """
     states = np.empty((len(drive) + 1, *start.shape))
     states[0] = start
-    _propagate(np.ascontiguousarray(A), np.ascontiguousarray(drive), states)
+    for t, push in enumerate(drive):
+        states[t + 1] = A @ states[t] + push
     return states[:-1], states[-1]
-
-
-@njit(cache=True)
-def _propagate(A: Array, drive: Array, states: Array) -> None:
-    count, order, signals = drive.shape
-    for t in range(count):
-        for i in range(order):
-            for r in range(signals):
-                states[t + 1, i, r] = drive[t, i, r]
-            for j in range(order):
-                for r in range(signals):
-                    states[t + 1, i, r] += A[i, j] * states[t, j, r]
 
 
 def _column(start: Array | None, order: int) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.head.voice import pitch_windows
 from facesynth.inference.pitch import RATE
@@ -14,7 +15,6 @@ from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import mean_pose
 
-Floats = NDArray[np.float64]
 LEAST = 2
 """Recordings to learn from."""
 

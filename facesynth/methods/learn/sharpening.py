@@ -3,15 +3,13 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.filters import sharpen, without_roughness
 from facesynth.inference.motion import Motion
 
 SHARES = np.linspace(0, 2, 9)
 """Where a share is looked for; more would be a caricature."""
-
-Floats = NDArray[np.float64]
 
 
 def matching_share(pairs: Iterable[tuple[Motion, Motion]]) -> float:

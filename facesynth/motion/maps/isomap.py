@@ -15,11 +15,12 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError
 
 NEIGHBOURS = 12
@@ -27,9 +28,6 @@ NEIGHBOURS = 12
 LANDMARKS = 100
 CORE = 6000
 """Points of which the ways are made; of a larger cloud every n-th, the others are placed beside them."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

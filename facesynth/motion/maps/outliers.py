@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from facesynth.inference.arrays import Floats
 from facesynth.inference.warp import time_warp
-from facesynth.motion.maps.isomap import Floats, nearest
+from facesynth.motion.maps.isomap import nearest
 from facesynth.motion.maps.phone_map import Cluster
 
 PLACES = 5

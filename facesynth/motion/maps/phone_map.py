@@ -12,10 +12,11 @@ from typing import Literal, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.filters import without_roughness
 from facesynth.motion.maps.isomap import NEIGHBOURS, Isomap
-from facesynth.motion.maps.plane import Floats, Ints, Mixed, Plane
+from facesynth.motion.maps.plane import Mixed, Plane
 
 Kind = Literal["isomap", "pca"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

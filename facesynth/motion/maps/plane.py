@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.filters import gaussian
 
 RHO = 0.35
 """Brightness of one point at its own place."""
 SIGMA = 0.012
 """Spread of a point, as a share of the map's longer side."""
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from facesynth.face.files.skin_picture import SIDE, skin_jpeg
+from facesynth.face.files.gltf.built_in import SIDE, skin_jpeg
 from facesynth.face.rig.anny import PARTS
 from facesynth.face.rig.markers import INNER_LIPS
 
