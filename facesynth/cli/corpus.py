@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.corpus_edit import edit
 from facesynth.cli.followed_points import Followed, keep_videos_of, points_followed, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
 
@@ -57,6 +58,9 @@ def spread_over(command: Any) -> Any:
 @click.group("corpus")
 def corpus_group() -> None:
     """Make, fill and check a corpus: a performer's recordings in a folder of plain files."""
+
+
+corpus_group.add_command(edit)
 
 
 @corpus_group.command("new")

@@ -7,6 +7,7 @@ from typing import Any
 
 from facesynth.corpus.files import Files
 from facesynth.corpus.header import FORMAT, Header
+from facesynth.corpus.journal import Journal
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import hash_file
 from facesynth.inference.errors import FacesynthError
@@ -14,7 +15,7 @@ from facesynth.inference.errors import FacesynthError
 
 def provenance(files: Files, header: Header, records: Iterable[Record]) -> dict[str, Any]:
     """Performer, licences, consents, size and hash of the utterances in `records`, as plain JSON values."""
-    records = sorted(records, key=lambda record: record.id)
+    records, edits = sorted(records, key=lambda record: record.id), Journal(files.journal).sum()
     return {
         "performer": header.performer,
         "synthetic": header.synthetic,
@@ -25,6 +26,8 @@ def provenance(files: Files, header: Header, records: Iterable[Record]) -> dict[
         "licences": sorted({record.licence or header.licence for record in records}),
         "consents": sorted({record.consent or header.consent for record in records}),
         "corpus_format": FORMAT,
+        "removed_nodes": len(edits.removed),
+        "drawn_nodes": len(edits.added),
         "sha256": content_hash(files, header, records),
     }
 

@@ -1,6 +1,7 @@
 """Everything that is wrong with a corpus, in one run."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from facesynth.corpus.checks import needs, sync, whole
@@ -51,6 +52,17 @@ def check(corpus: Corpus | str | Path, methods: Sequence[needs.Need] = ()) -> li
     problems += whole.rights(header, records.values())
     problems += whole.edits(files, header, records, phones)
     return sorted(problems, key=lambda problem: (not problem.grave, problem.file))
+
+
+def node_problems(corpus: Corpus) -> list[Problem]:
+    """What the check finds in the motion of single nodes, in usable utterances that can be read; `check` names the others."""
+    problems: list[Problem] = []
+    for record in track(corpus.usable_records, "checking"):
+        with suppress(FacesynthError):
+            phones = read_labelled(corpus.files.phones(record.id), corpus.duration_s(record.id)).phones
+            found = motion_problems(f"motion/{record.id}.npz", record.id, corpus.raw_motion(record.id), phones)
+            problems += [problem for problem in found if problem.nodes]
+    return problems
 
 
 def _utterance_problems(files: Files, header: Header, record: Record) -> tuple[list[Problem], int]:

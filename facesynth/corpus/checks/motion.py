@@ -192,17 +192,17 @@ def _jumps(
     fast = np.nan_to_num(steps) * motion.fps > FASTEST_MM_S
     for frame in (run.start for run in runs(fast.any(axis=1))):
         point = int(np.nanargmax(np.where(fast[frame], steps[frame], 0)))
-        where = _node_at(utterance_id, (frame + 1) / motion.fps, phones)
+        number = None if phones is None else _phone_at((frame + 1) / motion.fps, phones)
+        node = "" if number is None else node_name(utterance_id, number)
+        where = "" if phones is None or number is None else f" (node {node}, {phones.labels[number]})"
         yield Problem(
             file,
             f"{motion.layout.names[point]} jumps {steps[frame, point]:.1f} mm at {(frame + 1) / motion.fps:.3f} s{where}",
             "look at it; remove the node, or mend the motion",
             grave=False,
+            nodes=(node,) if node else (),
         )
 
 
-def _node_at(utterance_id: str, time_s: float, phones: PhoneTrack | None) -> str:
-    if phones is None:
-        return ""
-    number = min(int(np.searchsorted(phones.ends_s, time_s, side="right")), len(phones) - 1)
-    return f" (node {node_name(utterance_id, number)}, {phones.labels[number]})"
+def _phone_at(time_s: float, phones: PhoneTrack) -> int:
+    return min(int(np.searchsorted(phones.ends_s, time_s, side="right")), len(phones) - 1)

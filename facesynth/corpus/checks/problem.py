@@ -19,6 +19,8 @@ class Problem:
     do: str
     grave: bool = True
     """False for what is merely worth knowing."""
+    nodes: tuple[str, ...] = ()
+    """In which it can be seen, where it can be told."""
 
     def __str__(self) -> str:
         return f"{'' if self.grave else 'note: '}{self.file}: {self.what} → {self.do}"

@@ -71,9 +71,10 @@ def swap_problems(file: str, utterance_id: str, motion: Motion, phones: PhoneTra
         if start <= edge and count - stop <= edge and motion.layout.neutral is not None:
             yield Problem(file, f"{what} are swapped throughout", "give them each other's names, or add the recording again")
         else:
-            where = _nodes(utterance_id, start / motion.fps, stop / motion.fps, phones)
+            touched = _nodes(utterance_id, start / motion.fps, stop / motion.fps, phones)
+            where = f" (nodes {', '.join(touched[:4])}{' …' if len(touched) > 4 else ''})" if touched else ""
             what_happened = f"{what} are swapped from {start / motion.fps:.2f} to {stop / motion.fps:.2f} s{where}"
-            yield Problem(file, what_happened, "look at it; exchange their tracks there, or remove the nodes", grave=False)
+            yield Problem(file, what_happened, "look at it; exchange their tracks there, or remove the nodes", False, touched)
 
 
 # Exchanging markers i and j of a frame x lowers the sum of squared distances from the rest r by
@@ -151,9 +152,8 @@ def _extent(rest: Floats) -> float:
     return float(np.linalg.norm(np.ptp(rest, axis=0)))
 
 
-def _nodes(utterance_id: str, start_s: float, end_s: float, phones: PhoneTrack | None) -> str:
+def _nodes(utterance_id: str, start_s: float, end_s: float, phones: PhoneTrack | None) -> tuple[str, ...]:
     if phones is None:
-        return ""
+        return ()
     spans = enumerate(pairwise([0.0, *phones.ends_s.tolist()]))
-    touched = [node_name(utterance_id, number) for number, (begin, end) in spans if begin < end_s and end > start_s]
-    return f" (nodes {', '.join(touched[:4])}{' …' if len(touched) > 4 else ''})" if touched else ""
+    return tuple(node_name(utterance_id, number) for number, (begin, end) in spans if begin < end_s and end > start_s)
