@@ -97,7 +97,7 @@ def _stat(path):
 
 
 def _finish(command):
-    subprocess.run([*COMMAND, *command], check=True, capture_output=True, timeout=180)
+    subprocess.run([*COMMAND, *command], check=True, capture_output=True, timeout=1800)
 
 
 def lasting(folder):

@@ -146,7 +146,7 @@ def limited(limit, *arguments):
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=1800,
         preexec_fn=lower,
     )
 
@@ -183,7 +183,7 @@ def test_a_signal_in_the_middle_leaves_nothing(model, tmp_path, sent):
         assert process.stdout.readline().strip() == "writing", process.stderr.read()
         time.sleep(0.2)
         process.send_signal(sent)
-        _, error = process.communicate(timeout=60)
+        _, error = process.communicate(timeout=1800)
     assert process.returncode == 130
     assert "interrupted" in error.splitlines()[-1]
     assert not list((tmp_path / "o").iterdir())

@@ -420,6 +420,6 @@ def test_two_ray_workers_give_the_same_bytes_as_one_process(tmp_path):
     for engine in ("processes", "ray"):
         options = ["--engine", engine, "--jobs", "1" if engine == "processes" else "2", "--performer", "A"]
         command = [*COMMAND, "add", str(tmp_path / engine), str(tmp_path / "session"), *options]
-        subprocess.run(command, check=True, capture_output=True, timeout=300)
+        subprocess.run(command, check=True, capture_output=True, timeout=1800)
         made.append({name: content for name, content in contents(tmp_path / engine).items() if name[0] != "."})
     assert made[0] == made[1]

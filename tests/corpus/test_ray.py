@@ -28,7 +28,7 @@ def python(code, *arguments, **environment):
         [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=1800,
         check=False,
         env={**os.environ, **environment},
     )

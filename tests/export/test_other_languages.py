@@ -67,7 +67,7 @@ def installed(example):
     folder = EXAMPLES / example
     if not (folder / "node_modules" / "onnxruntime-web").is_dir():
         command = [npm, "install", "--no-audit", "--no-fund", "--ignore-scripts"]
-        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=1800)
         if done.returncode:
             pytest.skip(f"npm cannot install onnxruntime-web here: {done.stderr.strip()[-200:]}")
     return folder
@@ -89,7 +89,7 @@ def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
     model, sound = talking_head
     export_model(model, tmp_path / "lds")
     command = [shutil.which("node"), "speak.mjs", str(tmp_path / "lds"), str(sound)]
-    done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=1800)
     said = json.loads(done.stdout)
     frames = np.array(said["frames"]).reshape(said["count"], said["channels"])
     assert said["fps"] == FPS
@@ -137,7 +137,7 @@ def test_node_refuses_what_the_runtime_refuses(lds_file, exported, tmp_path):
             change(folder)
         (tmp_path / f"{name}.wav").write_bytes(sound)
         command = [node, "speak.mjs", str(folder), str(tmp_path / f"{name}.wav")]
-        done = subprocess.run(command, cwd=here, check=False, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(command, cwd=here, check=False, capture_output=True, text=True, timeout=1800)
         said[name] = (done.returncode, done.stderr)
     for name, (_, _, message) in WRONG.items():
         assert said[name][0] != 0, name
@@ -151,7 +151,7 @@ def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
     sound.write_bytes(wav(channels=2, samples=8000))
     here = installed("node")
     command = [shutil.which("node"), "speak.mjs", str(folder), str(sound)]
-    said = json.loads(subprocess.run(command, cwd=here, check=True, capture_output=True, text=True, timeout=60).stdout)
+    said = json.loads(subprocess.run(command, cwd=here, check=True, capture_output=True, text=True, timeout=1800).stdout)
     stream = load(folder).stream(noise=0.0)
     wanted = np.concatenate([stream.push(read_wav(sound)[0]), stream.finish()])
     assert np.abs(np.array(said["frames"]).reshape(wanted.shape) - wanted).max() < 1e-2  # mm
@@ -180,8 +180,8 @@ def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
     here = tmp_path / "page"
     shutil.copytree(example, here, ignore=shutil.ignore_patterns("site", "node_modules"))
     (here / "node_modules").symlink_to(example / "node_modules")
-    subprocess.run([sys.executable, "make_site.py", str(model), str(sound)], cwd=here, check=True, timeout=180)
-    subprocess.run([shutil.which("node"), "build.mjs"], cwd=here, check=True, timeout=60)
+    subprocess.run([sys.executable, "make_site.py", str(model), str(sound)], cwd=here, check=True, timeout=1800)
+    subprocess.run([shutil.which("node"), "build.mjs"], cwd=here, check=True, timeout=1800)
     report = visited(browser, here / "site", tmp_path)
     assert "error" not in report, report
     frames = np.array(report["frames"]).reshape(report["count"], report["channels"])

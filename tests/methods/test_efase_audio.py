@@ -289,7 +289,7 @@ def test_the_training_scripts_learn_weights(script, method, tmp_path, repository
         "sharpening=0.5",
         *(["candidates=10"] if method == "efase" else []),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=1800)
     assert done.returncode == 0, done.stderr
     assert "validation error" in done.stdout
     assert "audio_weight=" in done.stdout
