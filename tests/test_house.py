@@ -163,6 +163,41 @@ def test_inference_imports_numpy_and_onnxruntime_alone():
                 assert node.level <= depth, f"{path.relative_to(ROOT)} reaches out of inference"
 
 
+SHARED = 8
+"""So many lines in a row, one after the other in two places, are one thing written twice."""
+
+
+def runs_of_code(paths):
+    """Where every run of SHARED lines of code begins; blank lines, comments, imports and lone brackets do not count."""
+    found = {}
+    for path in paths:
+        lines = [(n, line.strip()) for n, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)]
+        code = [(n, line) for n, line in lines if re.search(r"\w", line) and not re.match(r"#|import |from \S+ import ", line)]
+        for k in range(len(code) - SHARED + 1):
+            found.setdefault(tuple(line for _, line in code[k : k + SHARED]), f"{path.relative_to(ROOT.parent)}:{code[k][0]}")
+    return found
+
+
+def test_inference_is_written_once(repository):
+    """What a trained model does is in inference/: the rest calls it and does not repeat it."""
+    below = set((ROOT / "inference").rglob("*.py"))
+    above = set(ROOT.rglob("*.py")) | set((repository / "train").glob("*.py")) | set((repository / "export").glob("*.py"))
+    ours, theirs = runs_of_code(below), runs_of_code(above - below)
+    assert len(ours) > 1000
+    twice = [f"{ours[run]} ~ {theirs[run]}" for run in ours.keys() & theirs.keys()]
+    assert not twice, f"written twice, let the one above call the one below: {', '.join(sorted(twice))}"
+
+
+def test_a_run_that_stands_twice_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path / "facesynth")
+    lines = [f"value_{k} = {k}" for k in range(SHARED)]
+    (tmp_path / "one.py").write_text("import a\n" + "\n\n# why\n".join(lines))
+    (tmp_path / "other.py").write_text("    (\n" + "\n".join(f"    {line}" for line in lines))
+    assert runs_of_code([tmp_path / "one.py"]).keys() == runs_of_code([tmp_path / "other.py"]).keys()
+    (tmp_path / "other.py").write_text("\n".join(lines[1:]))
+    assert not runs_of_code([tmp_path / "other.py"])
+
+
 IMPORTED_AS = {
     "scikit-learn": "sklearn",
     "pyyaml": "yaml",
@@ -177,7 +212,6 @@ NOT_BY_US = {
     "setuptools": "pyworld imports it",
     "facesynth": "its own extras",
     "websockets": "uvicorn speaks to the page through it",
-    "optuna": "the parameter search is to use it, or it goes",
 }
 
 
