@@ -8,6 +8,7 @@ from takes import NAMES, timecodes_of, values_of, write
 from facesynth.corpus.importers.formats import read
 from facesynth.face.files.livelink import read_livelink
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.livelink import WEIGHTS, is_live_link
 
 CODES, VALUES = timecodes_of(120), values_of(120)
@@ -77,3 +78,21 @@ def test_corpus_add_reads_and_tells(tmp_path):
     assert "taken as per cent" in " ".join(report["remarks"]["take"])
     assert "taken as per cent" in account
     assert not [problem for problem in bringing.checked(tmp_path / "c") if "per cent" in problem["what"]]
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz"])
+def test_weights_of_any_table_in_per_cent(tmp_path, suffix):
+    """Curves of a table under ARKit's names; what has names of its own is as it was measured."""
+    names = [*ARKIT_NAMES[:20], "breath"]
+    shares = np.random.default_rng(4).random((60, 21))
+    for scale in (1.0, 100.0):
+        path = tmp_path / f"a{scale:g}.{suffix}"
+        values = shares * np.array([scale] * 20 + [40.0])
+        if suffix == "npz":
+            np.savez(path, weights=values, names=np.array(names), fps=60.0)
+        else:
+            rows = np.column_stack([np.arange(60) / 60, values])
+            np.savetxt(path, rows, delimiter=",", header=",".join(["time_s", *names]), comments="", fmt="%.8f")
+        reading = read(path)
+        np.testing.assert_allclose(reading.motion.frames, shares * np.array([1.0] * 20 + [40.0]), atol=1e-5)
+        assert any("per cent" in remark for remark in reading.remarks) == (scale == 100)

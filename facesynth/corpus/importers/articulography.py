@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.importers.matlab import load_mat
 from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, require_file
-from facesynth.corpus.importers.tables import load_mat
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.speech.segments import Segment, phone_track

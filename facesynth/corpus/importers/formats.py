@@ -4,18 +4,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from facesynth.corpus.importers.articulography import is_articulography, read_articulography
 from facesynth.corpus.importers.beat import is_beat, read_beat
 from facesynth.corpus.importers.c3d import read_c3d
 from facesynth.corpus.importers.description import Description, Written, description_beside
 from facesynth.corpus.importers.flame import is_flame, read_flame
 from facesynth.corpus.importers.livelink import read_livelink_motion
+from facesynth.corpus.importers.matlab import load_mat
 from facesynth.corpus.importers.openface import is_openface, read_openface
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, open_gaps, require_file
-from facesynth.corpus.importers.tables import load_mat, read_numbers, read_table
+from facesynth.corpus.importers.tables import read_numbers, read_table
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
-from facesynth.motion.livelink import is_live_link
+from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.motion.livelink import FEWEST_SHAPES, as_shares, is_live_link
+
+ARKIT = frozenset(map(str.lower, ARKIT_NAMES))
 
 
 @dataclass(frozen=True)
@@ -114,14 +120,30 @@ def _table(path: Path, asked: Asked) -> Reading:
 
 
 def _with_gaps(path: Path, reading: Reading) -> Reading:
-    """A table's markers with gaps where it holds numbers for them."""
+    """A table's markers with gaps where it holds numbers for them, its curves with ARKit's weights as shares."""
     motion = reading.motion
+    if motion.layout.kind == "curves":
+        return _with_shares(path, reading)
     if motion.layout.kind != "markers":
         return reading
     points, said = open_gaps(motion.points)
     frames = points.reshape(motion.frames.shape)
     opened = motion_of_arrays(path, frames, motion.fps, motion.layout, motion.head, motion.eyes)
     return replace(reading, motion=opened, remarks=(*reading.remarks, *said))
+
+
+def _with_shares(path: Path, reading: Reading) -> Reading:
+    """Curves whose weights under ARKit's names are shares of 1; what has other names is as it was measured."""
+    motion = reading.motion
+    are_weights = [name.lower() in ARKIT for name in motion.layout.names]
+    if sum(are_weights) < FEWEST_SHAPES:
+        return reading
+    values, said = as_shares(path, np.nan_to_num(motion.frames.astype(np.float64)), are_weights)
+    if not any("per cent" in line for line in said):
+        return reading
+    frames = np.where(np.isnan(motion.frames), np.nan, values)
+    shares = motion_of_arrays(path, frames, motion.fps, motion.layout, motion.head, motion.eyes)
+    return replace(reading, motion=shares, remarks=(*reading.remarks, *said))
 
 
 FORMATS: Mapping[str, Format] = {

@@ -14,6 +14,9 @@ from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.gaps import filled_in
 from facesynth.speech.segments import Segment
 
+SLOWEST_HZ, FASTEST_HZ = 1.0, 10000.0
+"""Rates at which faces are recorded lie between."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sound:
@@ -63,6 +66,8 @@ def motion_of_arrays(
         motion = Motion(np.asarray(frames, np.float32), float(fps), layout, _single(head), _single(eyes))
     except (ValueError, TypeError) as error:
         raise FacesynthError(f"{path}: {error}") from None
+    if not SLOWEST_HZ <= motion.fps <= FASTEST_HZ:
+        raise FacesynthError(f"{path} states {motion.fps:g} frames a second; wanted {SLOWEST_HZ:g} to {FASTEST_HZ:g}; give --fps")
     if not len(motion) or np.isinf(motion.frames).any() or np.isnan(motion.frames).all():
         raise FacesynthError(f"{path} holds no frames, only missing samples, or infinite values; export it again")
     return motion

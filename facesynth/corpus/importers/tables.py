@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus.importers.description import ORDER, Written
+from facesynth.corpus.importers.matlab import load_mat
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.motion_files import read_csv, shortened, time_column
 from facesynth.inference.errors import FacesynthError, unknown
@@ -195,18 +196,6 @@ def _numbers(found: Mapping[str, Any], prefix: str = "") -> dict[str, NDArray[An
             fields = {field: value.ravel()[0][field] for field in value.dtype.names}
             arrays |= _numbers(fields, f"{prefix}{name}.")
     return arrays
-
-
-def load_mat(path: Path) -> dict[str, Any]:
-    """The variables of a MATLAB file (up to version 7.2), structs as objects."""
-    from scipy.io import loadmat
-
-    try:
-        return {name: value for name, value in loadmat(path, squeeze_me=False).items() if not name.startswith("__")}
-    except NotImplementedError:
-        raise FacesynthError(f"{path} is a MATLAB 7.3 file; save it with -v7") from None
-    except Exception as error:  # SciPy's reader raises anything on damaged files
-        raise FacesynthError(f"{path} is no MATLAB file, or is damaged ({error})") from None
 
 
 def _named(arrays: dict[str, NDArray[Any]], names: tuple[str, ...]) -> NDArray[Any] | None:
