@@ -20,6 +20,8 @@ from facesynth.motion.arkit_names import ARKIT_NAMES
 if TYPE_CHECKING:
     from facesynth.face.solve.fitting import LayoutFit
 
+BLOCK = 4096
+"""Frames whose markers are held in double precision at once."""
 RIDGE = 2e-4
 """Share of the mean squared shape length that a shape pays for being used."""
 GAP_WEIGHT = 4.0
@@ -48,6 +50,10 @@ class MarkerBasis:
     """[52] shapes that are solved for; the others keep the weights they are given."""
     gap_rows: NDArray[np.float64]
     """[P, 3K] picks the vertical distance of each pair of facing lip markers."""
+
+    def offsets(self, frames: ArrayLike, piece: slice) -> NDArray[np.float64]:
+        """[t, 3K] how far the markers of some frames are from rest, mm."""
+        return np.asarray(np.asarray(frames)[piece], np.float64) - self.rest_mm
 
     @classmethod
     def of(cls, rig: Rig, layout: Layout) -> MarkerBasis:
@@ -84,15 +90,21 @@ def solve_markers(
     known: [T, 52] weights of the shapes that are not solved for (gaze, tongue); zero where not given. Their
     share of the motion is taken off the markers first.
     """
-    offsets = np.asarray(frames, np.float64) - basis.rest_mm
-    weights = np.zeros((len(offsets), len(basis.shapes_mm))) if known is None else np.array(known, np.float64)
+    weights = np.zeros((len(np.asarray(frames)), len(basis.shapes_mm))) if known is None else np.array(known, np.float64)
     weights[:, basis.free] = 0.0
-    wanted = offsets - weights @ basis.shapes_mm
-    lift = np.concatenate([np.eye(offsets.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
-    weights[:, basis.free] = solve(basis.shapes_mm[basis.free] @ lift, wanted @ lift, basis.ridge[basis.free], fps=fps)
-    weights = follow_gap(basis, weights, offsets)
-    off = (weights @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
-    return weights, np.sqrt((off**2).sum(axis=2).mean(axis=1))
+    pieces = [slice(first, first + BLOCK) for first in range(0, max(1, len(weights)), BLOCK)]
+    lift = np.concatenate([np.eye(basis.shapes_mm.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
+    shapes = basis.shapes_mm[basis.free] @ lift
+    onto = np.linalg.qr(shapes.T)[0]  # what lies outside of the shapes' span changes no weight
+    wanted = [(basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto) for piece in pieces]
+    weights[:, basis.free] = solve(shapes @ onto, np.concatenate(wanted), basis.ridge[basis.free], fps=fps)
+    residual_mm = np.empty(len(weights))
+    for piece in pieces:
+        offsets = basis.offsets(frames, piece)
+        weights[piece] = follow_gap(basis, weights[piece], offsets)
+        off = (weights[piece] @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
+        residual_mm[piece] = np.sqrt((off**2).sum(axis=2).mean(axis=1))
+    return weights, residual_mm
 
 
 def follow_gap(basis: MarkerBasis, weights: NDArray[np.float64], offsets_mm: NDArray[np.float64]) -> NDArray[np.float64]:
