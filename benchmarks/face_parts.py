@@ -25,9 +25,10 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.capabilities import Expressing, Looking
-from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, create, load
-from facesynth.stage.whole_face import PACKAGED_EYES, PACKAGED_HEAD
+from facesynth.methods.registry import ask, create, load_trained
+from facesynth.methods.trained import TrainedModel
+from facesynth.stage.whole_face import EYES, HEAD
+from facesynth.zoo.shelf import entry_of, find
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 TRAINED = {
@@ -37,7 +38,7 @@ TRAINED = {
     "head, hidden Markov models": ("head_hmm", "head_hmm.yaml"),
     "eyes": ("eyes", "eyes.yaml"),
 }
-PACKAGED = {"head of the package": PACKAGED_HEAD, "eyes of the package": PACKAGED_EYES}
+PACKAGED = {"head of the package": HEAD, "eyes of the package": EYES}
 MOST_RTF, MOST_MB = 0.05, 2.0
 REPEATS = 3
 
@@ -61,8 +62,8 @@ def main() -> None:
                 row(name, lambda m=method, c=config: trained(m, c, learned, Path(folder) / f"{m}.safetensors"), speech),
                 flush=True,
             )
-        for name, path in PACKAGED.items():
-            print(row(name, lambda path=path: path, speech), flush=True)
+        for name, model in PACKAGED.items():
+            print(row(name, lambda model=model: find(model), speech), flush=True)
 
 
 def trained(method: str, config: str, corpus: Corpus, path: Path) -> Path:
@@ -76,12 +77,13 @@ def row(name: str, made: Callable[[], Path], speech: Speech) -> str:
         path = made()
     except FacesynthError as reason:
         return f"| {name} | — | — | {reason} |"
-    model, size = load(path), path.stat().st_size / MB
+    model = load_trained(path)
+    size = (entry_of(path).size_bytes if path.is_dir() else path.stat().st_size) / MB
     factor = min(timed(model, speech) for _ in range(REPEATS + 1)) / speech.duration_s
     return f"| {name} | {size:.2f} | {factor:.4f} | {'yes' if size < MOST_MB and factor < MOST_RTF else 'NO'} |"
 
 
-def timed(model: Method, speech: Speech) -> float:
+def timed(model: TrainedModel, speech: Speech) -> float:
     """Processor seconds for what the model moves: itself, or what it adds to a motion that is there."""
     expressing, looking = ask(model, Expressing), ask(model, Looking)
     if expressing:
@@ -99,7 +101,7 @@ def timed(model: Method, speech: Speech) -> float:
     return spent.processor_s
 
 
-def at_rest(model: Method, speech: Speech) -> Motion:
+def at_rest(model: TrainedModel, speech: Speech) -> Motion:
     """A face and a head that do not move."""
     motion = model.synthesize(replace(speech, emotions=EmotionTrack.constant("neutral", speech.duration_s)))
     return replace(motion, frames=motion.frames[:1].repeat(len(motion), axis=0), eyes=None)

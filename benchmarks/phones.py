@@ -28,7 +28,7 @@ from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, resample
 from facesynth.speech.decoder_recognition import recognise_by_decoder
-from facesynth.speech.phone_network import phone_hearing
+from facesynth.speech.phone_graph import phone_hearing
 from facesynth.speech.recognition import recognise
 from facesynth.speech.segments import phone_track, segments_of
 

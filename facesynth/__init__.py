@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.inference.motion import Motion
     from facesynth.inference.speech import Speech
-    from facesynth.methods.registry import create, list_methods, load
+    from facesynth.methods.registry import create, list_methods
     from facesynth.stage.speaking import speak
+    from facesynth.zoo.shelf import load
 
 __all__ = ["Corpus", "Motion", "Speech", "__version__", "create", "list_methods", "load", "speak"]
 
@@ -27,7 +28,7 @@ _HOMES = {
     "Speech": "inference.speech",
     "create": "methods.registry",
     "list_methods": "methods.registry",
-    "load": "methods.registry",
+    "load": "zoo.shelf",
     "speak": "stage.speaking",
 }
 

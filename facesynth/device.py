@@ -1,8 +1,13 @@
 """Where tensors live: the processor, or an accelerator beside it."""
 
-import torch
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from facesynth.inference.errors import FacesynthError, unknown
+
+if TYPE_CHECKING:
+    import torch
 
 DEVICES = ("auto", "cpu", "cuda", "mps")
 
@@ -12,6 +17,8 @@ def device_of(name: str) -> torch.device:
 
     `auto` is a CUDA device, or else the processor: Apple's (mps) has no float64, which maps and sound features need.
     """
+    import torch
+
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     kind, _, number = name.partition(":")

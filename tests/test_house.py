@@ -27,7 +27,8 @@ BELOW = {
     "performer": {"inference", "speech", "motion", "corpus", "face"},
     "evaluation": {"inference", "speech", "motion", "corpus", "face", "methods"},
     "export": {"inference", "speech", "motion", "face", "methods"},
-    "stage": {"inference", "speech", "motion", "corpus", "capture", "face", "methods"},
+    "zoo": {"inference", "methods"},
+    "stage": {"inference", "speech", "motion", "corpus", "capture", "face", "methods", "zoo"},
     "studio": {"inference", "speech", "motion", "corpus", "face", "methods", "stage"},
 }
 """What a room may import; the command line may import everything."""

@@ -1,6 +1,6 @@
 """Train the head that comes with the package, on recordings of several people.
 
-python train/packaged_head.py CORPUS... [-o facesynth/stage/head.safetensors]
+python train/packaged_head.py CORPUS... [-o head.safetensors]
 
 Heads are brought to one rate, each recording to its own mean posture; long recordings are cut into parts.
 """
@@ -24,7 +24,6 @@ from facesynth.methods.training import train
 from facesynth.motion.resample import resample
 
 CONFIG = Path(__file__).parents[1] / "configs" / "head_hmm.yaml"
-TARGET = Path(__file__).parents[1] / "facesynth" / "stage" / "head.safetensors"
 FPS, PART_S = 30.0, 5.0
 LAYOUT = Layout("curves", ("still",))
 
@@ -68,7 +67,7 @@ def add_parts(corpus: Corpus, name: str, utterance: Utterance) -> None:
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("corpora", type=Path, nargs="+", metavar="CORPUS")
-    parser.add_argument("-o", "--output", type=Path, default=TARGET)
+    parser.add_argument("-o", "--output", type=Path, default=Path("head.safetensors"))
     parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
     return parser.parse_args(arguments)
 

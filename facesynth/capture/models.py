@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import subprocess
-import sys
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +17,7 @@ from typing import TYPE_CHECKING
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.wheels import download_wheel, read_members
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -28,7 +26,6 @@ WHEEL = "mediapipe==0.10.21"
 """Newer ones carry no models."""
 _PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "3.11", "--implementation", "cp", "--abi", "cp311")
 """One wheel for everybody: only files are taken out of it, nothing in it runs."""
-PATIENCE_S = 600
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ def fetch_landmarks() -> Path:
     if fetched():
         return folder
     with tempfile.TemporaryDirectory(prefix="facesynth-") as temporary:
-        convert_wheel(_downloaded(Path(temporary)))
+        convert_wheel(download_wheel(WHEEL, Path(temporary), _PLATFORM))
     return folder
 
 
@@ -103,27 +100,9 @@ def model_path(name: str) -> Path:
     return cache_dir("landmarks") / f"{name}-{MODELS[name].sha256[:12]}.onnx"
 
 
-def _downloaded(folder: Path) -> Path:
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-    command += ["--only-binary", ":all:", *_PLATFORM, "--dest", str(folder), WHEEL]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-    except subprocess.TimeoutExpired:
-        raise FacesynthError(f"{WHEEL} did not arrive in {PATIENCE_S // 60} minutes; try again") from None
-    wheels = sorted(folder.glob("*.whl"))
-    if done.returncode or not wheels:
-        reason = (done.stderr.strip().splitlines() or ["pip gave no reason"])[-1]
-        raise FacesynthError(f"{WHEEL} could not be downloaded ({reason}); is there a network, and pip in this Python?")
-    return wheels[0]
-
-
 def _checked(wheel: Path, model: Model) -> bytes:
     """The model's bytes; FacesynthError unless they are the very ones that are known."""
-    try:
-        with zipfile.ZipFile(wheel) as archive:
-            content = archive.read(model.member)
-    except (OSError, KeyError, zipfile.BadZipFile) as error:
-        raise FacesynthError(f"{wheel.name} is not the wheel of {WHEEL} ({error})") from None
+    (content,) = read_members(wheel, [model.member])
     if hashlib.sha256(content).hexdigest() != model.sha256:
         raise FacesynthError(f"{model.member} in {wheel.name} is not the file that is known (its sha256 differs); it is not used")
     return content

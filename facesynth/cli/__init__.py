@@ -9,6 +9,7 @@ import click
 
 from facesynth import __version__
 from facesynth.inference.errors import FacesynthError
+from facesynth.packages import missing
 
 VERBS = {
     "demo": ("facesynth.cli.demo:demo", "Built-in performer: corpus, training, speech, video."),
@@ -16,13 +17,18 @@ VERBS = {
     "train": ("facesynth.cli.train:train", "Train a method on a corpus."),
     "speak": ("facesynth.cli.speak:speak", "Turn speech into a talking face."),
     "studio": ("facesynth.cli.studio:studio", "Work on what a model says, in the browser."),
+    "models": ("facesynth.cli.models:models", "List the models that can be used at once."),
     "retarget": ("facesynth.cli.retarget:retarget", "Put motion on any head, from a few frames posed by hand."),
     "emotion": ("facesynth.cli.emotion:emotion", "Hear the emotion in a voice."),
     "tune": ("facesynth.cli.tune:tune", "Search a method's settings on held-out sentences."),
-    "fetch": ("facesynth.cli.fetch:fetch", "Download what is not part of facesynth: the models that find faces."),
+    "fetch": ("facesynth.cli.fetch:fetch", "Download the head that is shown, and the models that find faces."),
     "export": ("facesynth.cli.export:export", "Write a model as ONNX graphs that run without torch."),
+    "card": ("facesynth.cli.models:card", "Write what a model learned from, and under which licence."),
+    "push": ("facesynth.cli.models:push", "Write a model into one file, for another place."),
+    "pull": ("facesynth.cli.models:pull", "Keep a model from a file or URL, to be used by its name."),
     "evaluate": ("facesynth.cli.evaluate:evaluate", "Compare methods on sentences they did not see."),
     "reproduce": ("facesynth.cli.reproduce:reproduce", "A paper's figures beside ours, as far as they can be compared."),
+    "doctor": ("facesynth.cli.doctor:doctor", "What is installed, what is missing, and what to do."),
 }
 
 
@@ -73,6 +79,10 @@ def run(command: click.Command, arguments: Sequence[str] | None = None, method: 
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted; what was finished before is kept", err=True)
         sys.exit(130)
+    except ImportError as error:
+        if (said := missing(error)) is None:
+            raise
+        _leave(str(said))
     except OSError as error:
         _leave(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
 

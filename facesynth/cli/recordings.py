@@ -8,12 +8,10 @@ from facesynth.inference.errors import FacesynthError
 
 def recordings(paths: Iterable[Path]) -> list[Path]:
     """The files named, and those inside the folders named; FacesynthError where there is none."""
-    from facesynth.corpus.add.recordings import AUDIO, VIDEO
-
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in AUDIO | VIDEO and not p.name.startswith("."))
+            inside = sorted(p for p in path.iterdir() if p.is_file() and is_recording(p) and not p.name.startswith("."))
             if not inside:
                 raise FacesynthError(f"{path} holds no sound; wanted files such as clip.wav")
             found += inside
@@ -22,3 +20,10 @@ def recordings(paths: Iterable[Path]) -> list[Path]:
         else:
             raise FacesynthError(f"{path}: no such file")
     return found
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a name is that of a sound or a video, or a folder, where such are looked for."""
+    from facesynth.corpus.add.recordings import AUDIO, VIDEO
+
+    return path.is_dir() or path.suffix.lower() in AUDIO | VIDEO

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 import json
 from collections.abc import Sequence
 
-from facesynth.cli.recordings import recordings
+from facesynth.cli.recordings import is_recording, recordings
 from facesynth.cli.targets import plan_targets, require_free
 from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size
 from facesynth.inference.errors import FacesynthError
@@ -77,8 +77,7 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 
 
 @click.command("speak", cls=WithMethodOptions)
-@click.argument("model", type=FILE)
-@click.argument("speech", nargs=-1, required=True, type=FILE)
+@click.argument("given", nargs=-1, required=True, type=FILE, metavar="[MODEL] SPEECH...")
 @click.option(
     "-o",
     "--output",
@@ -149,26 +148,28 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def speak(
     *,
-    model: Path,
-    speech: tuple[Path, ...],
+    given: tuple[Path, ...],
     outputs: tuple[Path, ...],
     text_file: Path | None,
     device: str,
     as_json: bool,
-    **given: Any,
+    **asked: Any,
 ) -> None:
     """Turn SPEECH, files or folders of them, into a talking face.
 
+    MODEL is a model's file, a folder that `facesynth export` wrote, or a name that `facesynth models` lists; without one the
+    face is that of the model that comes with facesynth for everybody's voice.
     A transcript (clip.txt) or phones (clip.TextGrid) beside a sound file are used where none are given.
     """
-    from facesynth.device import device_of
-    from facesynth.methods.registry import load
+    from facesynth.methods.trained import on_device
     from facesynth.stage.performance import check_output
     from facesynth.stage.speaking import produce
+    from facesynth.zoo.shelf import load
 
     for line in speak.options_of_methods()[1]:
         _tell(f"warning: {line}")
-    place, request = device_of(device), _request(text_file, given)
+    request = _request(text_file, asked)
+    model, speech = _model_and_speech(given)
     targets, paths = [check_output(path) for path in outputs], recordings(speech)
     if len(paths) > 1:
         _require_batch(targets, request)
@@ -176,12 +177,24 @@ def speak(
     plan = plan_targets(paths, targets, [path for path in speech if path.is_dir()], read)
     if request.explain:
         require_free(request.explain, [*paths, *read])
-    production = produce(load(model).to(place), targets, request)
+    production = produce(on_device(load(model), device), targets, request)
     if len(paths) > 1:
         _say_all(production, plan, as_json)
         return
     spoken = production.say(paths[0], plan[paths[0]], _tell)
     click.echo(json.dumps(spoken.facts) if as_json else "", nl=as_json)
+
+
+def _model_and_speech(given: tuple[Path, ...]) -> tuple[Path, tuple[Path, ...]]:
+    """The model, which may be left out, and what is to be spoken."""
+    from facesynth.zoo.shelf import DEFAULT, find, is_model
+
+    first, rest = given[0], given[1:]
+    if is_model(first) or (rest and not is_recording(first)):
+        if not rest:
+            raise FacesynthError(f"{first} is to speak, but nothing to be spoken was given; name a sound file")
+        return find(first), rest
+    return find(DEFAULT), given
 
 
 def _request(text_file: Path | None, given: dict[str, Any]) -> Request:

@@ -4,10 +4,10 @@ from itertools import combinations
 
 import numpy as np
 
-from facesynth.export.builder import Builder
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
 from facesynth.export.speech_graphs import cepstrum_graph, mel_cepstra_graph
+from facesynth.graph_builder import Builder
 from facesynth.inference.emotion_track import HOP_S, WINDOW_S
 from facesynth.inference.pitch import RATE
 from facesynth.methods.emotion.detector import EmotionDetector

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.graph_builder import Builder
 from facesynth.inference.efase.exported import SOUND
 from facesynth.methods.efase.audio import PhoneSound
 from facesynth.methods.learn.expectation import PosePredictor

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from facesynth import __version__
 from facesynth.export.graph import Graph, Parity, check_parity
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.folder import ARRAYS, FORMAT, MANIFEST, OPSET, digest
+from facesynth.inference.folder import ARRAYS, CARD, FORMAT, MANIFEST, OPSET, digest
 from facesynth.inference.phones import PHONES, viseme_of
 from facesynth.progress import track
 
@@ -56,7 +56,7 @@ class Subject:
 def write_folder(folder: str | Path, subject: Subject, content: Content) -> dict[str, Any]:
     """Check every graph, then write the folder, whole or not at all; returns the manifest.
 
-    A folder that was exported before is replaced; any other one is left alone.
+    A folder that was exported before is replaced, all but its card; any other one is left alone.
     """
     folder = Path(folder)
     _require_free(folder)
@@ -73,6 +73,8 @@ def write_folder(folder: str | Path, subject: Subject, content: Content) -> dict
             np.savez(part / ARRAYS, allow_pickle=False, **content.arrays)
         manifest = _manifest(part, subject, content, parities)
         (part / MANIFEST).write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        if (card := folder / CARD).is_file():
+            shutil.copyfile(card, part / CARD)
         if folder.exists():
             shutil.rmtree(folder)
         part.rename(folder)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from facesynth.export.builder import Builder
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
+from facesynth.graph_builder import Builder
 from facesynth.inference.head.hmm import HEARD_FPS, KEYS_PER_S
 from facesynth.inference.head.voice import FEATURES, PROSODY, pitch_windows
 from facesynth.inference.pitch import RATE

@@ -7,11 +7,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import TYPES, Builder
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.export.weights import Weights, stored_as
 from facesynth.face.solve.key_poses import KeyPoseMap
+from facesynth.graph_builder import TYPES, Builder
 
 
 def export_key_poses(

@@ -5,9 +5,9 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder, power_spectrum
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
+from facesynth.graph_builder import Builder, power_spectrum
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE
 

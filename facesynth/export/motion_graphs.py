@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.graph_builder import Builder
 from facesynth.methods.anime_graph.maps import EmotionMaps
 
 Function = Callable[[NDArray[Any]], NDArray[Any]]

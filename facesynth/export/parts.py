@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder
+from facesynth.graph_builder import Builder
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.export.weights import Weights, stored_as

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.graph_builder import Builder
 from facesynth.motion.search.cheapest import cheapest
 from facesynth.motion.search.steps import GivenSteps
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.solve.blendshapes import GAP_WEIGHT, MarkerBasis, follow_gap
 from facesynth.face.solve.bounded import SMOOTHING_S, solve
+from facesynth.graph_builder import Builder
 from facesynth.inference.layout import Layout
 from facesynth.motion.arkit_names import ARKIT_NAMES
 

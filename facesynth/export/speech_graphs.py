@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.builder import Builder, power_spectrum
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.graph_builder import Builder, power_spectrum
 from facesynth.inference.contours import FFT, HOP, SMALLEST_POWER, WINDOW
 from facesynth.inference.pitch import RATE
 from facesynth.methods.parts import part

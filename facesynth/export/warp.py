@@ -7,10 +7,10 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from facesynth.export.builder import Builder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.face.texture.filling import EDGE
 from facesynth.face.texture.warp import PiecewiseAffineWarp
+from facesynth.graph_builder import Builder
 
 EXAMPLE_POINTS = 12
 

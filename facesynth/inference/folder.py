@@ -19,6 +19,8 @@ FORMAT = 3
 MANIFEST = "manifest.json"
 LARGEST_MANIFEST_BYTES = 1 << 24
 ARRAYS = "arrays.npz"
+CARD = "card.yaml"
+"""What whoever takes the model must know; it may be corrected, so the manifest does not list it."""
 OPSET = 20
 """Of the graphs."""
 KEYS = (

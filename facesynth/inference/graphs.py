@@ -13,27 +13,29 @@ Part = Callable[..., list[NDArray[Any]]]
 """A graph of a folder, or anything else that is called with named arrays and gives its outputs in order."""
 
 
+def session_of(graph: bytes, threads: int) -> Any:
+    """An onnxruntime session of a graph, on so many threads; onnxruntime's own errors for what it does not run."""
+    import onnxruntime  # here: models of torch run without it
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads, options.inter_op_num_threads, options.log_severity_level = threads, 1, 3
+    # Waiting threads sleep: the processor is seldom ours alone.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    return onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+
+
 class Graph:
     """One graph of a folder, called with named arrays: `graph(features=u, state=x)` gives its outputs in order."""
 
     def __init__(self, folder: Folder, name: str, threads: int) -> None:
-        import onnxruntime  # here: models of torch run without it
-
         if name not in folder.manifest["graphs"]:
             raise FacesynthError(f"{folder.path}: the manifest lists no graph {name!r}; export the model again")
         entry = folder.manifest["graphs"][name]
         self.name, self.inputs = name, entry["inputs"]
         self.outputs = [port["name"] for port in entry["outputs"]]
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads, options.inter_op_num_threads, options.log_severity_level = threads, 1, 3
-        # Waiting threads sleep: the processor is seldom ours alone.
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        content = folder.bytes_of(entry["file"])
         try:
-            self._session = onnxruntime.InferenceSession(
-                folder.bytes_of(entry["file"]), options, providers=["CPUExecutionProvider"]
-            )
-        except FacesynthError:
-            raise
+            self._session = session_of(content, threads)
         except Exception as error:  # onnxruntime raises classes of its own, which share no base but Exception
             raise FacesynthError(f"{folder.path / entry['file']} is no graph that onnxruntime runs ({error})") from None
         held = sorted(port.name for port in self._session.get_inputs())

@@ -4,15 +4,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from facesynth.inference.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError, reject_options
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Editing, Editor, Explaining
-from facesynth.methods.method import Method
 from facesynth.methods.registry import ask
+from facesynth.methods.trained import TrainedModel
 
 
-def editor_of(method: Method) -> Editor:
+def editor_of(method: TrainedModel) -> Editor:
     """Whatever is quickest for this method."""
     editing = ask(method, Editing)
     return PlainEditor(method) if editing is None else editing.edit()
@@ -22,7 +22,7 @@ def editor_of(method: Method) -> Editor:
 class PlainDraft:
     """A speech whose motion is made whole when its first part is asked for."""
 
-    method: Method
+    method: TrainedModel
     speech: Speech
     options: dict[str, Any]
     changed_s: tuple[float, float] | None
@@ -51,11 +51,11 @@ class PlainDraft:
 class PlainEditor:
     """Synthesises anew after each change."""
 
-    def __init__(self, method: Method) -> None:
+    def __init__(self, method: TrainedModel) -> None:
         self.method = method
 
     def change(self, speech: Speech, *, seed: int = 0, **options: Any) -> PlainDraft:
         """See `Editor.change`."""
-        if foreign := {name: value for name, value in options.items() if self.method.capabilities.option(name) is None}:
-            self.method.refuse(foreign)
+        known = [option.name for option in self.method.capabilities.options]
+        reject_options(self.method.name, options.keys() - set(known), ("seed", *known))
         return PlainDraft(self.method, speech, {"seed": seed, **options}, (0.0, speech.duration_s))

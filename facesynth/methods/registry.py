@@ -14,7 +14,9 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.folder import open_folder
 from facesynth.methods.capabilities import WORDS, Capabilities, Option
+from facesynth.methods.trained import ExportedModel, TrainedModel, is_exported
 
 if TYPE_CHECKING:
     from facesynth.corpus.checks.needs import Need
@@ -71,12 +73,11 @@ def capabilities_of(name: str) -> Capabilities:
     """What a method can do; FacesynthError with the nearest names where there is none, or where its package is broken."""
     if name in _CLASSES:
         return _CLASSES[name].capabilities
-    entries = _entries()
-    if name not in entries:
+    if (entry := BUILT_IN.get(name) or _entries().get(name)) is None:  # reading what is installed takes a while
         raise unknown("method", name, list_methods())
-    stated = _of_package(entries[name], entries[name].load)
+    stated = _of_package(entry, entry.load)
     if not isinstance(stated, Capabilities) or stated.name != name:
-        raise FacesynthError(f"{_said_by(entries[name])} must name the Capabilities of {name}; got {stated!r:.80}")
+        raise FacesynthError(f"{_said_by(entry)} must name the Capabilities of {name}; got {stated!r:.80}")
     return stated
 
 
@@ -132,20 +133,23 @@ def able(ability: type) -> list[str]:
     return [one.name for one in known_capabilities()[0] if ability in one.abilities]
 
 
-def ask(method: Method, ability: type[A]) -> A | None:
+def ask(method: TrainedModel, ability: type[A]) -> A | None:
     """The method as one that has an ability; None where it has not."""
-    return method if isinstance(method, ability) else None
+    able = method.model if isinstance(method, ExportedModel) else method
+    return able if isinstance(able, ability) else None
 
 
-def require(method: Method, ability: type[A]) -> A:
+def require(method: TrainedModel, ability: type[A]) -> A:
     """The same; FacesynthError, naming methods that have it, where it has not."""
     if (found := ask(method, ability)) is None:
+        if isinstance(method, ExportedModel) and ability in method.capabilities.abilities:
+            raise FacesynthError(f"{method.path} is an exported {method.name}, which {WORDS[ability][0]}; its own file does")
         without, others = WORDS[ability]
         raise FacesynthError(f"{method.name} {without}; {_joined(able(ability))} {others}")
     return found
 
 
-def require_option(method: Method, name: str) -> Option:
+def require_option(method: TrainedModel, name: str) -> Option:
     """A method's own option of `speak`; FacesynthError, naming methods that have it, where it has not."""
     if (own := method.capabilities.option(name)) is not None:
         return own
@@ -156,7 +160,7 @@ def require_option(method: Method, name: str) -> Option:
     raise FacesynthError(f"{method.name} has no option {flag}; it is one of {_joined(having)}")
 
 
-def read_option(method: Method, name: str, value: Any, phones: PhoneTrack) -> Any:
+def read_option(method: TrainedModel, name: str, value: Any, phones: PhoneTrack) -> Any:
     """The value of a method's own option as `synthesize` takes it: a file is read, with the phones that are spoken."""
     option = require_option(method, name)
     if option.type is not Path:
@@ -198,9 +202,21 @@ def load(path: str | Path) -> Method:
     """A trained method from a file that `Method.save` wrote; FacesynthError for anything else."""
     from facesynth.methods.model_file import read_header
 
+    if is_exported(path):
+        raise FacesynthError(f"{path} is an exported folder, which speaks and does nothing else; give the model's own file")
     method = method_class(read_header(path)["method"]).load(path)
     method.path = Path(path)
     return method
+
+
+def load_trained(path: str | Path) -> TrainedModel:
+    """A model that speaks: a trained method's file, or an exported folder, which needs no torch."""
+    if not is_exported(path):
+        return load(path)
+    name = str(open_folder(path).manifest["method"])
+    if name not in list_methods():
+        raise FacesynthError(f"{path} holds {name}, which moves no face by itself; give a model that speaks")
+    return ExportedModel(path, capabilities_of(name))
 
 
 def _entries() -> Mapping[str, EntryPoint]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from facesynth.inference.errors import FacesynthError
@@ -61,6 +60,8 @@ class _Change:
         """
         if len(signal) < 2 or not falls(self.fps, self.new_fps):
             return signal
+        from scipy.signal import butter, sosfiltfilt  # takes 0.3 s to import
+
         lowpass = butter(ORDER, PASS * self.new_fps / self.fps, output="sos")
         return sosfiltfilt(lowpass, signal, axis=0, padlen=reach_of(len(signal), self.fps, self.new_fps))
 

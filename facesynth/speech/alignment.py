@@ -88,7 +88,7 @@ def _heard(audio: NDArray[np.float32], rate: int) -> Sequence[Spike]:
     """What the network hears; nothing where it is not installed."""
     if not is_installed():
         return ()
-    from facesynth.speech.phone_network import phone_hearing
+    from facesynth.speech.phone_graph import phone_hearing
 
     return phone_hearing().spikes(audio, rate)
 

@@ -22,6 +22,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.sound import KAISER_BETA, REACH
 from facesynth.inference.sound import resample as polyphase
 from facesynth.inference.wav import FIRST_CHUNK, find_samples
+from facesynth.packages import is_installed
 from facesynth.speech.containers import PRIMED, read_container, unstated_priming
 from facesynth.speech.one_channel import one_channel
 
@@ -33,6 +34,9 @@ SHORTEST_S = 0.05
 SILENT_DB = -60.0
 """Level of the loudest 50 ms, in dB of full scale, below which a sound counts as silence."""
 
+LONG_S = 120.0
+"""From here on torchaudio resamples, five times as fast. For less it is not worth its start, which takes two seconds, and
+speaking does without torch: the filter of the ground floor is the same one, to 2e-7 of the largest sample."""
 LARGEST_KERNEL = 1 << 20
 """Taps. torchaudio writes each phase of its filter out over a whole period: 160 × 497 taps from 44.1 to 16 kHz, but
 16 000 × 44 157 (2.8 GB) from 44 101 Hz. Rates with so little in common take the polyphase filter of the ground floor."""
@@ -88,7 +92,7 @@ def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np
     common = gcd(rate, new_rate)
     up, down = new_rate // common, rate // common
     around = -(-REACH * down // min(up, down))
-    if up * (down + 2 * around) > LARGEST_KERNEL:
+    if len(audio) < LONG_S * rate or up * (down + 2 * around) > LARGEST_KERNEL or not is_installed("torchaudio"):
         return polyphase(audio, rate, new_rate)
     return _in_blocks(audio, up, down, around)
 

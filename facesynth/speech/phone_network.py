@@ -1,6 +1,5 @@
 """The network that hears phones of any speaker and language: sound in, probabilities of IPA tokens and hidden layers out."""
 
-from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -9,21 +8,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from facesynth.inference.ear import STEP
-from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phone_hearing import PhoneHearing
-from facesynth.inference.phones import SILENCE
-from facesynth.inference.spikes import Alphabet
 from facesynth.speech.phone_archive import PhoneArchive, read_archive
-from facesynth.speech.phone_labels import normalise_phone
-
-HOP, WINDOW = STEP // 2, 400
-"""Samples between frames of the spectrum, and in each."""
-BLOCKS, WIDTH, HEADS, KERNEL = 4, 144, 4, 31
-BANDS = 80
-SMALLEST_POWER = 1e-10
-GLIDES = "jw"
-"""What begins a token for two sounds."""
+from facesynth.speech.phone_weights import BANDS, BLOCKS, HEADS, HOP, KERNEL, SMALLEST_POWER, WIDTH, WINDOW, network_weights
 
 
 class FeedForward(nn.Module):
@@ -110,7 +96,7 @@ class PhoneNetwork(nn.Module):
         self.head = nn.Linear(WIDTH, len(archive.tokens))
         self.register_buffer("spectrum", torch.zeros(WINDOW, WINDOW + 2))
         self.register_buffer("filters", torch.zeros(WINDOW // 2 + 1, BANDS))
-        self.load_state_dict(_renamed({name: torch.from_numpy(array) for name, array in archive.weights.items()}))
+        self.load_state_dict({name: torch.from_numpy(array) for name, array in network_weights(archive).items()})
         self.requires_grad_(False).eval()
 
     def forward(self, audio: Tensor) -> tuple[Tensor, Tensor]:
@@ -137,70 +123,7 @@ class PhoneNetwork(nn.Module):
         return [found.cpu().numpy() for found in self(torch.from_numpy(audio).to(self.spectrum.device))]
 
 
-def alphabet_of(tokens: Sequence[str]) -> Alphabet:
-    """What tokens in IPA stand for on a face; marks, tones and breath stand for nothing."""
-    return Alphabet(tuple(tokens), tuple(map(_phones_of, tokens)))
-
-
-def phone_hearing() -> PhoneHearing:
-    """The installed network, ready to hear; FacesynthError where it is missing or changed."""
-    network = phone_network()
-    return PhoneHearing(network.part, alphabet_of(network.tokens))
-
-
-def _phones_of(token: str) -> tuple[str, ...]:
-    """As one label; a glide and a vowel (`ja`) letter by letter, and so what is no label."""
-    if token.startswith("<") or not token.strip():
-        return ()
-    if len(token) == 2 and token[0] in GLIDES:
-        return tuple(phone for letter in token for phone in _phones_of(letter))
-    try:
-        return tuple(phone for phone in (normalise_phone(token, "ipa"),) if phone != SILENCE)
-    except FacesynthError:
-        return tuple(phone for letter in token for phone in _phones_of(letter)) if len(token) > 1 else ()
-
-
 @cache
 def phone_network() -> PhoneNetwork:
     """The network with the installed weights, read once; FacesynthError where they are missing or changed."""
     return PhoneNetwork(read_archive())
-
-
-# The archive comes from a graph whose constants lost their names: convolutions are numbered in the order in which they are
-# applied, and so are the matrices of each block (two of a feed-forward, two of attention, two of the last feed-forward).
-def _renamed(arrays: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Weights by the names that they have in PhoneNetwork."""
-    convolutions, matrices = _numbered(arrays, "onnx::Conv_"), _numbered(arrays, "onnx::MatMul_")
-    found = {"stem.weight": convolutions[0], "stem.bias": convolutions[1], "filters": arrays["mel_fb"]}
-    found["spectrum"] = torch.cat([arrays["stft_real_kernel"], arrays["stft_imag_kernel"]])[:, 0].T
-    found |= {f"head.{kind}": arrays[f"acoustic_model.model.proj.{kind}"].squeeze() for kind in ("weight", "bias")}
-    for number in range(BLOCKS):
-        ours, theirs = f"blocks.{number}.", f"acoustic_model.model.blocks.{number}."
-        names = ("first.wide", "first.back", "attention.heads", "attention.out", "last.wide", "last.back")
-        found |= {f"{ours}{name}.weight": matrices[6 * number + k].T for k, name in enumerate(names)}
-        found[f"{ours}convolution.along_time.weight"] = convolutions[2 + 2 * number]
-        found[f"{ours}convolution.along_time.bias"] = convolutions[3 + 2 * number]
-        for new, old in _NAMES.items():
-            found |= {f"{ours}{new}.{kind}": arrays[f"{theirs}{old}.{kind}"].squeeze() for kind in ("weight", "bias")}
-        found |= {f"{ours}{name}.bias": arrays[theirs + old] for name, old in _BIASES.items()}
-    return found
-
-
-_NAMES = {
-    **{f"{new}.norm": f"{old}.norm" for new, old in (("first", "ffn1"), ("last", "ffn2"), ("convolution", "conv"))},
-    **{
-        "attention.norm": "attn_norm",
-        "norm": "norm",
-        "convolution.gate": "conv.pointwise1",
-        "convolution.out": "conv.pointwise2",
-    },
-}
-_BIASES = {
-    **{"first.wide": "ffn1.fc1.bias", "first.back": "ffn1.fc2.bias", "last.wide": "ffn2.fc1.bias", "last.back": "ffn2.fc2.bias"},
-    **{"attention.heads": "attn.in_proj_bias", "attention.out": "attn.out_proj.bias"},
-}
-
-
-def _numbered(arrays: Mapping[str, Tensor], prefix: str) -> list[Tensor]:
-    names = [name for name in arrays if name.startswith(prefix)]
-    return [arrays[name] for name in sorted(names, key=lambda name: int(name.removeprefix(prefix)))]

@@ -13,7 +13,7 @@ from facesynth.inference.spikes import Spike, segments_around
 from facesynth.progress import track
 from facesynth.speech.audio import no_speech, require_sound
 from facesynth.speech.fitting import fit_phones
-from facesynth.speech.phone_network import phone_hearing
+from facesynth.speech.phone_graph import phone_hearing
 from facesynth.speech.pieces import quiet_pieces
 from facesynth.speech.pronunciation import Pronunciation
 from facesynth.speech.segments import Segment, in_one, phone_track

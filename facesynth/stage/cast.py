@@ -10,8 +10,8 @@ from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.capabilities import Explaining, Expressing, MappingEmotions
-from facesynth.methods.method import Method
-from facesynth.methods.registry import able, ask, load, read_option, require, require_option
+from facesynth.methods.registry import able, ask, load_trained, read_option, require, require_option
+from facesynth.methods.trained import TrainedModel
 from facesynth.stage.request import AUTO, Part, Request
 
 if TYPE_CHECKING:
@@ -25,12 +25,12 @@ BESIDE = "emotion.safetensors"
 class Cast:
     """Who makes the motion of one performance after the other."""
 
-    mouth: Method
-    head: Method | None = None
+    mouth: TrainedModel
+    head: TrainedModel | None = None
     """Moves the head, where a model of its own was asked for."""
-    eyes: Method | None = None
+    eyes: TrainedModel | None = None
     """The same of the eyes."""
-    expression: Method | None = None
+    expression: TrainedModel | None = None
     """Adds the emotions, so that the mouth speaks neutrally, where such a model was asked for."""
     mapper: MappingEmotions | None = None
     """Maps the motion to another emotion."""
@@ -38,7 +38,7 @@ class Cast:
     """Hears the emotion."""
 
     @property
-    def members(self) -> tuple[Method, ...]:
+    def members(self) -> tuple[TrainedModel, ...]:
         """Who moves something."""
         return tuple(one for one in (self.mouth, self.head, self.eyes) if one is not None)
 
@@ -47,7 +47,7 @@ class Cast:
         """Those that can be felt."""
         return (self.expression or self.mouth).emotions
 
-    def options(self, request: Request, phones: PhoneTrack, mover: Method | None = None) -> dict[str, Any]:
+    def options(self, request: Request, phones: PhoneTrack, mover: TrainedModel | None = None) -> dict[str, Any]:
         """The own options of one of them, of the mouth where none is named; files of them are read."""
         mover = mover or self.mouth
         asked = {name: value for name, value in request.own.items() if mover.capabilities.option(name)}
@@ -73,7 +73,7 @@ class Cast:
         return replace(speech, emotions=EmotionTrack.constant(plain, speech.duration_s))
 
 
-def cast_for(mouth: Method, request: Request) -> Cast:
+def cast_for(mouth: TrainedModel, request: Request) -> Cast:
     """The models that a request needs; FacesynthError for what none of them can do."""
     if mouth.capabilities.part != "mouth":
         part = mouth.capabilities.part
@@ -96,11 +96,11 @@ def cast_for(mouth: Method, request: Request) -> Cast:
     return cast
 
 
-def _mover(part: str, asked: Part) -> Method | None:
+def _mover(part: str, asked: Part) -> TrainedModel | None:
     """The model that moves a part, where one was asked for."""
     if asked.model is None:
         return None
-    mover = load(asked.model)
+    mover = load_trained(asked.model)
     if mover.capabilities.part != part:
         raise FacesynthError(f"{asked.model} moves the {mover.capabilities.part}; --{part} wants a model of the {part}")
     if asked.method not in ("", mover.name, mover.name.removeprefix(f"{part}_")):
@@ -108,17 +108,17 @@ def _mover(part: str, asked: Part) -> Method | None:
     return mover
 
 
-def _mapper(mouth: Method, request: Request) -> MappingEmotions | None:
+def _mapper(mouth: TrainedModel, request: Request) -> MappingEmotions | None:
     if request.to_emotion is None:
         return None
-    model = load(request.maps) if request.maps else mouth
+    model = load_trained(request.maps) if request.maps else mouth
     if (mapper := ask(model, MappingEmotions)) is None:
         wanted = f"give a model of the same performer that does ({', '.join(able(MappingEmotions))}) with --maps"
         raise FacesynthError(f"{model.name} learns no emotion maps; {wanted}")
     return mapper
 
 
-def _detector(mouth: Method, path: Path | None) -> EmotionDetector:
+def _detector(mouth: TrainedModel, path: Path | None) -> EmotionDetector:
     from facesynth.methods.emotion.detector import EmotionDetector
 
     beside = mouth.path.with_name(BESIDE) if mouth.path else Path(BESIDE)

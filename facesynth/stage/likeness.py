@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from facesynth.face.texture.speaker import Speaker
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
-from facesynth.methods.method import Method
+from facesynth.methods.trained import TrainedModel
 from facesynth.motion.planar import picture_points
 from facesynth.motion.resample import resample
 from facesynth.progress import track
@@ -72,7 +73,7 @@ class PictureStage:
     warnings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, mouth: Method, request: Request) -> "PictureStage":
+    def of(cls, mouth: TrainedModel, request: Request) -> Self:
         """The speaker of a model; what was asked for that the pictures decide is warned of."""
         idle = [f"--{name}" for name in ("fps", "size") if getattr(request, name) is not None]
         idle += [f"--{name}" for name in ("head", "eyes") if getattr(request, name) != Part()]

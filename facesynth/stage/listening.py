@@ -1,21 +1,26 @@
 """From a recording to the speech that is to be said: what was given, what lies beside it, what is heard in it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from facesynth.inference.emotion_track import track_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import EmotionTrack, Speech
-from facesynth.methods.emotion.detector import EmotionDetector
 from facesynth.speech.hearing import Heard, hear
 from facesynth.speech.intensity import read_intensity
 from facesynth.speech.textgrid import write_textgrid
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import AUTO, Request
+
+if TYPE_CHECKING:
+    from facesynth.methods.emotion.detector import EmotionDetector
 
 Tell = Callable[[str], None]
 """Takes a line for a person, as soon as there is one."""

@@ -11,7 +11,7 @@ from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos, shapes_beside
 from facesynth.face.texture.speaker import Speaker, lower_face_window
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.method import Method
+from facesynth.methods.trained import TrainedModel
 from facesynth.motion.planar import HeadMaps, is_tracked
 from facesynth.progress import track
 
@@ -74,7 +74,7 @@ def speaker_of(corpus: Corpus) -> Speaker:
     )
 
 
-def load_face(mouth: Method) -> Speaker:
+def load_face(mouth: TrainedModel) -> Speaker:
     """The pictures beside a model that was loaded from a file; FacesynthError where there are none, or of another speaker."""
     if mouth.path is None:
         raise FacesynthError("the pictures of the real face lie beside the model's file; save the model and load it")

@@ -11,15 +11,15 @@ from facesynth.inference.errors import unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Accounting, Explaining
-from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, load, own_options, require
+from facesynth.methods.registry import ask, own_options, require
+from facesynth.methods.trained import TrainedModel
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.hearing import Heard
 from facesynth.stage.cast import Cast, cast_for
-from facesynth.stage.likeness import PictureStage, check_picture_output
 from facesynth.stage.listening import Tell, keep_phones, listen
 from facesynth.stage.performance import HeadStage, Written, check_output
 from facesynth.stage.request import Request
+from facesynth.zoo.shelf import load
 
 
 class Shown(Protocol):
@@ -122,14 +122,16 @@ def _phones_beside(targets: Sequence[Path], heard: Heard, remark: Tell) -> list[
     return [grid] if heard.source in ("transcript", "recognition") and keep_phones(grid, heard, remark) else []
 
 
-def produce(mouth: Method, targets: Sequence[Path], request: Request) -> Production:
+def produce(mouth: TrainedModel, targets: Sequence[Path], request: Request) -> Production:
     """Models and the face that goes with them; FacesynthError, before anything is heard, for what cannot be done."""
     return Production(cast_for(mouth, request), stage_for(mouth, targets, request), request)
 
 
-def stage_for(mouth: Method, targets: Sequence[Path], request: Request) -> Stage:
+def stage_for(mouth: TrainedModel, targets: Sequence[Path], request: Request) -> Stage:
     """The real face for a model of points followed in video, a head for every other; it must have the files asked for."""
     if is_tracked(mouth.fitted_layout):
+        from facesynth.stage.likeness import PictureStage, check_picture_output
+
         for target in targets:
             check_picture_output(target)
         return PictureStage.of(mouth, request)

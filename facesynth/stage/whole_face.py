@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +12,15 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.methods.capabilities import Accounting, Looking
-from facesynth.methods.method import Method
-from facesynth.methods.registry import ask, load
+from facesynth.methods.registry import ask
+from facesynth.methods.trained import TrainedModel
 from facesynth.motion.resample import resample
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import Request
+from facesynth.zoo.shelf import load
 
-PACKAGED_HEAD = Path(__file__).with_name("head.safetensors")
-"""Comes with the package; head.md beside it says from whom it learned."""
-PACKAGED_EYES = Path(__file__).with_name("eyes.safetensors")
-"""Comes with the package; the README beside it says from whom it learned."""
+HEAD, EYES = "head", "eyes"
+"""Models that come with the package, for faces of which nobody recorded these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +44,7 @@ def whole_face(cast: Cast, motion: Motion, speech: Speech, request: Request) -> 
     return WholeFace(motion, eyes, sources)
 
 
-def described(model: Method) -> str:
+def described(model: TrainedModel) -> str:
     """A model by its method and file."""
     return model.name if model.path is None else f"{model.name} ({model.path.name})"
 
@@ -79,7 +77,7 @@ def _with_eyes(cast: Cast, motion: Motion, speech: Speech, request: Request) -> 
     return motion, packaged_eyes, "as the mouth's motion shows them, else grown from recorded ones of the package"
 
 
-def _looking(cast: Cast, eyes: Method, motion: Motion, speech: Speech, request: Request) -> Motion:
+def _looking(cast: Cast, eyes: TrainedModel, motion: Motion, speech: Speech, request: Request) -> Motion:
     """The motion with the eyes of their own model, which turns the head only where the head is not held still."""
     if (looking := ask(eyes, Looking)) is None:
         own = cast.options(request, speech.phones, eyes)
@@ -88,7 +86,7 @@ def _looking(cast: Cast, eyes: Method, motion: Motion, speech: Speech, request: 
     return replace(looked, head=motion.head) if request.head.source == "off" else looked
 
 
-def _account(model: Method, speech: Speech, request: Request) -> str:
+def _account(model: TrainedModel, speech: Speech, request: Request) -> str:
     if (accounting := ask(model, Accounting)) is None:
         return ""
     facts = accounting.account(speech, seed=request.seed).facts
@@ -104,15 +102,15 @@ def packaged_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | N
 
 @cache
 def _packaged() -> Looking:
-    model = ask(load(PACKAGED_EYES), Looking)
+    model = ask(load(EYES), Looking)
     if model is None:
-        raise TypeError(f"{PACKAGED_EYES} moves no eyes")
+        raise TypeError(f"the model {EYES} moves no eyes")
     return model
 
 
 @cache
-def _packaged_head() -> Method:
-    return load(PACKAGED_HEAD)
+def _packaged_head() -> TrainedModel:
+    return load(HEAD)
 
 
 def scaled(head: NDArray[np.float32] | None, gain: float) -> NDArray[np.float32] | None:

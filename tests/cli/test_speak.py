@@ -179,14 +179,15 @@ def test_wrong_files(shop, tmp_path, monkeypatch, capsys):
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(model.read_bytes()[:5000])
     assert "truncated" in refused(monkeypatch, capsys, "speak", broken, sound, "-o", tmp_path / "o.npz")
-    assert "not a facesynth model" in refused(monkeypatch, capsys, "speak", sound, sound, "-o", tmp_path / "o.npz")
+    (notes := tmp_path / "notes.txt").write_text("no model")
+    assert "not a facesynth model" in refused(monkeypatch, capsys, "speak", notes, sound, "-o", tmp_path / "o.npz")
     assert "no such file" in refused(monkeypatch, capsys, "speak", model, tmp_path / "no.wav", "-o", tmp_path / "o.npz")
     assert "output type" in refused(monkeypatch, capsys, "speak", model, sound, "-o", tmp_path / "o.xyz")
     assert "{name}" in refused(monkeypatch, capsys, "speak", model, sound, sound, "-o", tmp_path / "o.npz")
     assert "no setting" in refused(monkeypatch, capsys, "train", "efase", shop / "actor", "penalty")
     assert "did you mean penalty" in refused(monkeypatch, capsys, "train", "efase", shop / "actor", "penaly=3")
     assert "unknown method" in refused(monkeypatch, capsys, "train", "efaze", shop / "actor")
-    assert list(tmp_path.iterdir()) == [broken]
+    assert set(tmp_path.iterdir()) == {broken, notes}
 
 
 def test_nan_in_motion_and_a_lone_utterance(tmp_path, monkeypatch, capsys):

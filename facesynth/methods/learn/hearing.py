@@ -14,7 +14,8 @@ from facesynth.inference.expectation import Standard
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.speech.mel import LogMel
-from facesynth.speech.phone_network import WIDTH, phone_network
+from facesynth.speech.phone_network import phone_network
+from facesynth.speech.phone_weights import WIDTH
 
 Features = Literal["log_mel", "phone_net", "both"]
 BANDS = 40
