@@ -7,7 +7,7 @@ LANDMARKS := $(VENV)/.landmarks
 
 BROWSER := $(VENV)/.browser
 
-.PHONY: demo studio test test-slow lint clean
+.PHONY: demo studio test test-slow lint dist clean
 
 demo: $(READY)
 	$(BIN)/facesynth demo
@@ -44,6 +44,12 @@ $(BROWSER): $(READY)
 	  || { [ "$$(id -u)" = 0 ] && apt-get update -qq && apt-get install -y -qq chromium >/dev/null 2>&1; } \
 	  || $(BIN)/python -m playwright install --with-deps chromium; \
 	then touch $@; else echo "no browser could be had (apt-get install chromium): tests of the studio's page will be skipped"; fi
+
+# The wheel and the source distribution, of facesynth and of its runtime.
+dist: $(READY)
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m build --outdir dist export/runtime
 
 clean:
 	rm -rf $(VENV)

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.types import type_of
-
-if TYPE_CHECKING:
-    from facesynth.methods.capabilities import Option
-import json
-from collections.abc import Sequence
-
 from facesynth.cli.recordings import is_recording, recordings
 from facesynth.cli.targets import plan_targets, require_free
-from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size
+from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size, type_of
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
+    from facesynth.methods.capabilities import Option
     from facesynth.stage.request import Request
     from facesynth.stage.speaking import Production
 

@@ -1,3 +1,3 @@
 """The version of facesynth, and of the runtime that is built from this folder."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.sound import KAISER_BETA, REACH
-from facesynth.inference.sound import resample as polyphase
+from facesynth.inference.sound import KAISER_BETA, REACH, Resampler
 from facesynth.inference.wav import FIRST_CHUNK, find_samples
 from facesynth.packages import is_installed
 from facesynth.speech.containers import PRIMED, read_container, unstated_priming
@@ -93,8 +92,15 @@ def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np
     up, down = new_rate // common, rate // common
     around = -(-REACH * down // min(up, down))
     if len(audio) < LONG_S * rate or up * (down + 2 * around) > LARGEST_KERNEL or not is_installed("torchaudio"):
-        return polyphase(audio, rate, new_rate)
+        return _piece_by_piece(audio, rate, new_rate)
     return _in_blocks(audio, up, down, around)
+
+
+def _piece_by_piece(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np.float32]:
+    """By the ground floor's filter, which computes in float64: a block at a time holds memory down."""
+    resampler = Resampler(rate, new_rate)
+    parts = [resampler.push(audio[first : first + BLOCK]) for first in range(0, len(audio), BLOCK)]
+    return np.concatenate([*parts, resampler.finish()])
 
 
 def _in_blocks(audio: NDArray[np.float32], up: int, down: int, around: int) -> NDArray[np.float32]:
