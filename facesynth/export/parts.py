@@ -7,13 +7,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.graph_builder import Builder
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.export.weights import Weights, stored_as
 from facesynth.face.deform.mesh_distance import MeshDistanceDeformer
 from facesynth.face.deform.regions import RegionDeformer
 from facesynth.face.rig.arkit_rig import Rig
+from facesynth.graph_builder import Builder
 from facesynth.inference.layout import Layout
 
 

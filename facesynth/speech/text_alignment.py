@@ -15,8 +15,8 @@ from facesynth.inference.speech import PhoneTrack
 from facesynth.inference.spikes import Spike
 from facesynth.speech.audio import require_sound
 from facesynth.speech.ctc_alignment import NOTHING, Classes, align_phones, class_log_probabilities, fit_of
-from facesynth.speech.phone_matching import match
 from facesynth.speech.phone_graph import phone_hearing
+from facesynth.speech.phone_matching import match
 from facesynth.speech.pronunciation import Pronunciation
 from facesynth.speech.recognition import placed
 from facesynth.speech.segments import Segment
