@@ -16,7 +16,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.capabilities import Browsing, Explaining
 from facesynth.methods.method import Method
-from facesynth.methods.registry import require
+from facesynth.methods.registry import ask, require
 from facesynth.motion.gaps import for_looking
 from facesynth.motion.maps.phone_map import emotion_colours
 from facesynth.speech.audio import load_audio
@@ -153,6 +153,6 @@ def model_facts(model: Method, path: Path) -> Mapping[str, Any]:
         "options": options,
         "pins": stated.option(PINS) is not None,
         "edits": stated.option(NODES) is not None,
-        "mapped": list(model.mapped_phones()) if isinstance(model, Browsing) else [],
+        "mapped": list(found.mapped_phones()) if (found := ask(model, Browsing)) else [],
         "explains": Explaining in stated.abilities,
     }
