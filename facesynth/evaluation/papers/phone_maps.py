@@ -14,6 +14,8 @@ from facesynth.motion.maps.phone_map import PhoneMap, emotion_colours
 MOST_FRAMES = 1200
 """Of which the ways along the cloud are found."""
 SIZE = (320, 320)
+BRIGHTNESS = {"rho": 0.25, "sigma": 0.006}
+"""Of a node's frame: fainter and smaller than on a screen, as all are shown at once."""
 KINDS = ("pca", "isomap")
 TITLES = ("principal components", "Isomap", "Isomap: a node, and nodes halfway", "Isomap: the same neighbours")
 
@@ -51,7 +53,7 @@ def _picture(plane: PhoneMap, curved: PhoneMap) -> str:
     figure, axes = new_figure(11, 3.4, 1, 4)
     shown = ((plane, None), (curved, None), (curved, None), (curved, alike))
     for axis, title, (one, nodes) in zip(axes[0], TITLES, shown, strict=True):
-        axis.imshow(one.picture(SIZE, nodes), extent=one.plane.extent(SIZE))
+        axis.imshow(one.picture(SIZE, nodes, **BRIGHTNESS), extent=one.plane.extent(SIZE))
         axis.set(xticks=[], yticks=[])
         axis.set_title(title, fontsize=8)
     limits = axes[0, 2].axis()
