@@ -119,7 +119,7 @@ def longest(material: Material) -> list[Finding]:
     ours = f"{motion.duration_s:.0f} ({len(speech.phones)} phones), made in {spent.processor_s:.1f} s of the processor"
     why = "tested utterances one after the other; the paper tells no time"
     label, channel = shown_channels(motion.layout, motion.frames.astype(np.float64))[0]
-    picture = tracks_figure(motion.fps, {label: {"anime graph": motion.frames[:, channel]}}, LONGEST_S)
+    picture = tracks_figure(motion.fps, {label: {"anime graph": motion.frames[:, channel].astype(np.float64)}}, LONGEST_S)
     return [Finding("§8", "longest speech synthesised, s", f"{LONGEST_S}", ours, False, why, figure=picture)]
 
 

@@ -9,14 +9,14 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.methods.capabilities import Browsing
 from facesynth.motion.maps.isomap import NEIGHBOURS, evenly, neighbour_graph, residual_variance
-from facesynth.motion.maps.phone_map import PhoneMap, emotion_colours
+from facesynth.motion.maps.phone_map import Kind, PhoneMap, emotion_colours
 
 MOST_FRAMES = 1200
 """Of which the ways along the cloud are found."""
 SIZE = (320, 320)
 BRIGHTNESS = {"rho": 0.25, "sigma": 0.006}
 """Of a node's frame: fainter and smaller than on a screen, as all are shown at once."""
-KINDS = ("pca", "isomap")
+KINDS: tuple[Kind, ...] = ("pca", "isomap")
 TITLES = ("principal components", "Isomap", "Isomap: a node, and nodes halfway", "Isomap: the same neighbours")
 
 
