@@ -11,7 +11,7 @@ from facesynth.evaluation.papers import Material, deng2006_speech, reproduce
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import DEGREES, SPEECH
-from facesynth.evaluation.papers.finding import Finding, Reproduction, not_implemented
+from facesynth.evaluation.papers.finding import Finding, Reproduction, not_available
 from facesynth.evaluation.papers.joined import joined, phones_until
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.coarticulation.method import Coarticulation
@@ -55,7 +55,6 @@ def test_deng_2008_prints_the_paper_s_figure_ours_and_that_they_cannot_be_compar
     maps = by_what(result, "residual variance of")[0]
     assert all(0 <= float(rest) <= 1 for rest in maps.ours.split(" / "))
     assert by_what(result, "variance in 25")[0].paper == "98.53 %"
-    assert "not implemented" not in {one.status for one in result.findings}
     drawn = {one.where for one in result.findings if one.figure}
     assert {"§3", "table 5", "fig. 10", "figs 15, 16", "figs 5 to 9"} <= drawn
 
@@ -142,13 +141,13 @@ def test_the_dissertations_heads_are_refused_where_nobody_recorded_one(tmp_path)
 def test_a_page_shows_every_figure_and_its_picture_and_files_hold_no_pictures():
     rows = (
         Finding("fig. 1", "a <curve>", "3", "4", False, "other", figure="data:image/png;base64,AAAA"),
-        not_implemented("fig. 2", "maps", "x", "missing"),
+        not_available("fig. 2", "maps", "x", "missing"),
     )
     result = Reproduction("p", "P 2000", "Ours: nothing.", rows)
     page = result.page()
     assert 'src="data:image/png;base64,AAAA"' in page
     assert "a &lt;curve&gt;" in page
-    assert "not implemented here: missing" in page
+    assert "not available here: missing" in page
     assert "base64" not in result.csv() + str(result.to_dict())
 
 
@@ -157,13 +156,13 @@ def test_an_unknown_paper_is_answered_with_the_nearest(corpus):
         reproduce("deng2009", corpus)
 
 
-def test_every_status_has_its_place_and_files_hold_all():
+def test_what_is_missing_has_its_place_and_files_hold_all():
     rows = (
         Finding("table 1", "seconds", "2", "1", False, "other hardware"),
-        not_implemented("fig. 2", "maps", "a picture", "missing"),
+        not_available("fig. 2", "maps", "a picture", "missing"),
     )
     result = Reproduction("p", "P 2000", "Ours: nothing.", rows)
     assert "| table 1 | seconds | 2 | 1 | no: other hardware |" in result.markdown()
     assert "- fig. 2, maps (paper: a picture): missing" in result.markdown()
     lines = list(csv.DictReader(io.StringIO(result.csv())))
-    assert [line["status"] for line in lines] == ["measured", "not implemented"]
+    assert [line["status"] for line in lines] == ["measured", "not available"]

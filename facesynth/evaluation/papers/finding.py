@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from html import escape
 from typing import Any, Literal
 
-Status = Literal["measured", "not available", "not implemented"]
+Status = Literal["measured", "not available"]
 COLUMNS = ("where", "what", "paper", "ours", "comparable", "why", "status")
 
 
@@ -54,11 +54,9 @@ class Reproduction:
             if one.status == "measured":
                 verdict = f"{'yes' if one.comparable else 'no'}: {one.why}"
                 lines.append(f"| {one.where} | {one.what} | {one.paper} | {one.ours} | {verdict} |")
-        for status in ("not available", "not implemented"):
-            missing = [one for one in self.findings if one.status == status]
-            if missing:
-                lines += ["", f"{status.capitalize()} here:", ""]
-                lines += [f"- {one.where}, {one.what} (paper: {one.paper}): {one.why}" for one in missing]
+        if missing := [one for one in self.findings if one.status != "measured"]:
+            lines += ["", "Not available here:", ""]
+            lines += [f"- {one.where}, {one.what} (paper: {one.paper}): {one.why}" for one in missing]
         return "\n".join(lines) + "\n"
 
     def csv(self) -> str:
@@ -105,11 +103,6 @@ def _table_row(one: Finding) -> str:
         return f"<tr><td>{'</td><td>'.join(cells)}</td><td colspan=2>{one.status} here: {escape(one.why)}</td></tr>"
     cells += [f"<b>{escape(one.ours)}</b>", f"{'yes' if one.comparable else 'no'}: {escape(one.why)}"]
     return f"<tr><td>{'</td><td>'.join(cells)}</td></tr>"
-
-
-def not_implemented(where: str, what: str, paper: str, why: str) -> Finding:
-    """A figure for which the method is missing."""
-    return Finding(where, what, paper, why=why, status="not implemented")
 
 
 def not_available(where: str, what: str, paper: str, why: str) -> Finding:
