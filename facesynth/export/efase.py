@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, sound_arrays
+from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, residual_arrays, sound_arrays
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph
 from facesynth.export.motion_graphs import decode_graph, encode_graph
@@ -35,6 +35,7 @@ def efase_content(model: Efase) -> Content:
     """Everything that the runtime needs of a trained database; `inference.efase.exported` reads it."""
     nodes, weights, unit = model.nodes(), model.weights(), model.fitted_layout.unit
     arrays: dict[str, NDArray[Any]] = {name: getattr(nodes, name).astype(np.int32) for name in COLUMNS}
+    arrays |= residual_arrays(model.residual)
     arrays |= {
         "node_frames": nodes.frames,
         "rest": model.rest.cpu().numpy(),
@@ -66,6 +67,7 @@ def efase_content(model: Efase) -> Content:
             "speaking": asdict(model.settings()),
             "sound_weight": sound_weight,
             "pose_weight": pose_weight,
+            "residual": model.config["residual"] if model.residual and model.residual.any else 0.0,
         }
         | told,
         sample_rate=LogMel().sample_rate if graphs else None,

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.graph_builder import Builder
 from facesynth.inference.efase.exported import SOUND
+from facesynth.inference.residual import ARRAYS
 from facesynth.methods.efase.audio import PhoneSound
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.learn.pose_network import REACH, CausalBlock
+from facesynth.methods.learn.residual import Residual
 
 
 def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
@@ -74,3 +76,12 @@ def sound_arrays(sound: PhoneSound) -> dict[str, NDArray[Any]]:
 def _standard(hearing: Hearing, name: str) -> dict[str, NDArray[Any]]:
     """Mean and deviation [B] of the bands."""
     return {f"{name}_mean": hearing.mean.cpu().numpy(), f"{name}_deviation": hearing.deviation.cpu().numpy()}
+
+
+def residual_arrays(residual: Residual | None) -> dict[str, NDArray[Any]]:
+    """What moves beside the lips; nothing where a model keeps none."""
+    return (
+        {}
+        if residual is None or not residual.any
+        else {f"residual_{name}": getattr(residual, name).cpu().numpy() for name in ARRAYS}
+    )

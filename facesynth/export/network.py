@@ -1,6 +1,6 @@
 """The network of poses as graphs: sound to bands, and what is told of them to frames."""
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings
+from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, residual_arrays
 from facesynth.export.folder import Content
 from facesynth.export.speech_graphs import log_mel_graph
 from facesynth.inference.errors import FacesynthError
@@ -21,6 +21,7 @@ def network_content(model: Network) -> Content:
         settings={
             "expectation": predictor_settings(model.predictor),
             "sharpening": model.config["sharpening"],
+            "residual": model.config["residual"] if model.residual and model.residual.any else 0.0,
             "closed_gap": model.facts["closed_gap"] if model.config["close_lips"] else None,
         },
         latency={
@@ -29,5 +30,5 @@ def network_content(model: Network) -> Content:
             "must be trained with phones=false, gives what the whole gives without sharpening and closing of lips",
         },
         sample_rate=LogMel().sample_rate,
-        arrays=predictor_arrays(model.predictor),
+        arrays=predictor_arrays(model.predictor) | residual_arrays(model.residual),
     )

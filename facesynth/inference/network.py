@@ -18,6 +18,7 @@ from .layout import Layout
 from .lips import bilabial_spans
 from .motion import Motion
 from .phones import PHONE_INDEX, SILENCE
+from .residual import ResidualMotion, exported_residual, main_emotion
 from .sound import resample
 from .speech import NEUTRAL, Speech
 
@@ -43,6 +44,8 @@ class Network:
     sharpening: float = 0.0
     closed_gap: float = np.inf
     """How near the lips come at a p, b or m; infinite where they are left as they are."""
+    residual: ResidualMotion | None = None
+    """What moves beside the lips, whatever is said."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that it comes from."""
 
@@ -52,20 +55,22 @@ class Network:
         return self.expectation.look_ahead_s + BEYOND / self.expectation.reading.rate + HALF_WINDOW / RATE
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
-        """Motion for speech: what is expected, sharpened, lips closed at p, b and m. Nothing is random."""
+        """What is expected, sharpened, lips closed at p, b and m, and what moves beside the lips. Nothing is random."""
         reject_options("network", options, ("seed",))
         bands = self.hear(resample(speech.audio, speech.sample_rate, RATE))
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         frames = self.expectation.poses(bands, Said.of(speech, self.emotions), self.fps, count)
         frames = sharpen(frames, self.sharpening, self.fps)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
+        if self.residual is not None:
+            frames = frames + self.residual.track(speech, main_emotion(speech, self.emotions), self.fps, count)
         return Motion(frames.astype(np.float32), self.fps, self.layout)
 
     def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> "SoundStream":
         """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
 
-        FacesynthError for a model that is told phones, which a stream does not know. A stream is not sharpened, and closes no
-        lips.
+        FacesynthError for a model that is told phones, which a stream does not know. A stream is not sharpened, closes no
+        lips, and adds no residual motion.
         """
         if self.expectation.reading.phones:
             raise FacesynthError("this network is told what is said and wants whole utterances; train one with phones=false")
@@ -77,7 +82,7 @@ class Network:
 
 
 class SoundStream:
-    """`push` sound, get the frames that became final: those that `synthesize` gives without sharpening and closing of lips."""
+    """`push` sound, get the frames that became final: those of `synthesize` without sharpening, closing of lips and residual."""
 
     def __init__(self, model: Network, emotion: int) -> None:
         self.model, reading = model, model.expectation.reading
@@ -167,5 +172,6 @@ def load_network(folder: Folder, threads: int) -> Network:
         exported_expectation(folder, arrays, threads),
         sharpening=float(settings["sharpening"]),
         closed_gap=np.inf if gap is None else float(gap),
+        residual=exported_residual(folder, arrays),
         manifest=manifest,
     )

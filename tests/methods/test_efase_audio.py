@@ -274,7 +274,7 @@ def test_the_shipped_soft_settings_are_settings_of_efase(repository):
     assert config["pose_weight"] > 0
     assert config["learn"]
     still = Efase.from_config(load_config(repository / "configs" / "efase_soft_still.yaml")).config
-    assert still == {**config, "sharpening": 0.0}
+    assert still == {**config, "sharpening": 0.0, "residual": 0.0}
 
 
 @pytest.mark.parametrize(("script", "method"), [("efase.py", "efase"), ("anime_graph.py", "anime_graph")])

@@ -17,6 +17,7 @@ from ..expectation import Standard, exported_bands, exported_expectation
 from ..folder import Folder
 from ..graphs import Graph
 from ..phones import PHONES, viseme_of
+from ..residual import exported_residual
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -43,6 +44,7 @@ def load_efase(folder: Folder, threads: int) -> Efase:
             settings=Settings(**{**settings["speaking"], "smoothing": Smoothing(**settings["speaking"]["smoothing"])}),
             decode=lambda coordinates: decode(coordinates=coordinates[None])[0][0],
             hearing=_hearing(folder, arrays, nodes, threads),
+            residual=exported_residual(folder, arrays),
             manifest=manifest,
         )
     )

@@ -26,6 +26,7 @@ from ..layout import Layout
 from ..lips import gap, has_lips
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
+from ..residual import ResidualMotion, main_emotion
 from ..speech import NEUTRAL, Speech, frame_bounds
 
 LIP_PHONES = BILABIALS | LABIODENTALS
@@ -76,6 +77,8 @@ class Parts:
     """What computes the costs of the steps that a mean over paths needs."""
     mix: Mix | None = None
     """What takes means over paths; numpy unless another is given."""
+    residual: ResidualMotion | None = None
+    """What moves beside the lips, whatever is said."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that the model came from, if it came from one."""
 
@@ -114,7 +117,8 @@ class Efase:
         One after the other, at the database's rate: what is heard and expected (`hearing`); the cheapest path of each
         stretch of speech (`search`) and, above temperature 0, the mean over paths around it (`soft`); nodes stretched to
         their phones, joints smoothed, silence filled (`assembly`); `sharpen`; PCA decoded; the neutral rendering blended in
-        where an emotion is weak; lips closed at p, b, m (`closures`); then the motion is resampled to `fps`.
+        where an emotion is weak; lips closed at p, b, m (`closures`); then the motion is resampled to `fps`, and what moves
+        beside the lips is added (`residual`).
         """
         reject_options("efase", options, OPTIONS)
         new_fps = self.fps if fps is None else float(fps)
@@ -134,7 +138,14 @@ class Efase:
         labels, ends_s, new_fps = speech.phones.labels, speech.phones.ends_s, self.fps if fps is None else fps
         feelings, intensity = speech.emotions.per_phone(speech.phones)
         frames = self.frames(plans, labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
-        return Motion(self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1])), new_fps, self.layout)
+        made = self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1]))
+        return Motion(made + self.beside_lips(speech, new_fps, len(made)), new_fps, self.layout)
+
+    def beside_lips(self, speech: Speech, fps: float, count: int) -> NDArray[np.float32]:
+        """[count, C] recorded movement that is added beside the lips; 0 where the model keeps none."""
+        if self.parts.residual is None:
+            return np.zeros((count, self.layout.channels), np.float32)
+        return self.parts.residual.track(speech, main_emotion(speech, self.emotions), fps, count).astype(np.float32)
 
     def plan(
         self,

@@ -38,7 +38,8 @@ def window(model: Efase, plans: Sequence[Plan], speech: Speech, first: int, stop
     made = frames_between(frames, zero, int(bounds[-1]), fps, first, stop, model.fps)
     if model.layout.kind == "curves":
         made = np.clip(made, frames.min(axis=0), frames.max(axis=0))
-    return made.astype(np.float32)
+    beside = model.beside_lips(speech, model.fps, int(speech.phones.frame_bounds(model.fps)[-1]))
+    return (made + beside[np.minimum(np.arange(first, stop), len(beside) - 1)]).astype(np.float32)
 
 
 def frames_between(

@@ -27,6 +27,7 @@ from facesynth.inference.warp import stretched
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
+from facesynth.methods.learn.point_loss import lip_points
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.motion.resample import resample
 from facesynth.motion.search.posterior import posterior
@@ -102,7 +103,7 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
     errors = descend(logs, mean_error, examples, others, seed=seed, rounds=rounds, pull=pull)
     learned = _learned(model, logs, errors)
     if settings.get("sharpening", 0) > 0:
-        learned.settings["sharpening"] = _sharpening(model, learned, held_out[1])
+        learned.settings["sharpening"] = _sharpening(model, learned, held_out[1], settings.get("residual", 0.0))
     return learned
 
 
@@ -191,10 +192,11 @@ def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetr
     return LearnedMetrics(settings, errors, tuple(logs.factor("sound").tolist()), tuple(logs.factor("pose").tolist()))
 
 
-def _sharpening(model: Efase, learned: LearnedMetrics, held_out: Corpus) -> float:
+def _sharpening(model: Efase, learned: LearnedMetrics, held_out: Corpus, residual: float) -> float:
     """What the model needs, as it has been learned, to move as quickly as the recordings of sentences it does not know."""
-    model = model.with_weights(**learned.settings, sharpening=0.0)
+    model = model.with_weights(**learned.settings, sharpening=0.0, residual=0.0)
     model.count_by(learned.sound_metric, learned.pose_metric)
     fps = model.config["database_fps"]
     pairs = [(model.synthesize(u.speech, fps=fps), resample(u.motion, fps)) for u in track(held_out, "sharpening", len(held_out))]
-    return matching_share(pairs)
+    points = lip_points(held_out.layout) if residual > 0 else None  # the rest of the face gets its movement otherwise
+    return matching_share(pairs, points)

@@ -34,6 +34,7 @@ from facesynth.methods.efase.edits import Changed, EditsEditor, changed_nodes, e
 from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, map_beside, mapped_phones, places_of_all
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.torch_search import torch_engine, torch_mix
+from facesynth.methods.learn.residual import Residual
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.maps.phone_map import Kind, PhoneMap
@@ -56,7 +57,8 @@ class Efase(Method):
     `temperature` 0 is the paper: the cheapest path. Above 0 (in median rule-2 transitions, like `penalty`) every
     path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
     (see `soft`): nearer to the truth on average, with less motion. `audio_weight` and `pose_weight` let the sound
-    speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`); 0 in the paper.
+    speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`), `residual` is how much is
+    added of what recorded faces do beside their lips (see `inference.residual`); 0 in the paper.
 
     With `learn`, training starts from these weights and learns all that are above 0 on sentences of the corpus that it
     keeps out of the database meanwhile (see `learning`) before it fits with what it found. With `maps`, the Isomap of each
@@ -96,18 +98,20 @@ class Efase(Method):
         audio_weight: float = 0.0,
         pose_weight: float = 0.0,
         sharpening: float = 0.0,
+        residual: float = 0.0,
         learn: bool = False,
         maps: bool = True,
     ) -> None:
         super().__init__()
-        lowest = min(temperature, audio_weight, pose_weight, sharpening)
+        lowest = min(temperature, audio_weight, pose_weight, sharpening, residual)
         if lowest < 0 or candidates < 1:
             raise FacesynthError(
-                "temperature, audio_weight, pose_weight and sharpening must be at least 0, candidates at least 1; "
+                "temperature, audio_weight, pose_weight, sharpening and residual must be at least 0, candidates at least 1; "
                 f"got {lowest:g} and {candidates}"
             )
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0)
+        self.residual = Residual() if residual > 0 else None
         self._speaker: Speaker | None = None
         self._edited: tuple[Any, Self] | None = None
 
@@ -148,6 +152,8 @@ class Efase(Method):
         self.register_buffer("rest", torch.from_numpy(database.rest.astype(np.float32)))
         self.facts["median_transition"] = median_transition(self.nodes(), replace(self.weights(), pnt=1.0), seed)
         self.audio.learn(corpus, self.pca, database.names, nodes.phones, seed)
+        if self.residual is not None:
+            self.facts["no_residual"] = self.residual.learn(corpus)
         self._keep_bounds()
         self._keep_maps(keep=self.config["maps"])
         return self.to(device)
@@ -210,6 +216,7 @@ class Efase(Method):
                     decode=self._decode,
                     hearing=self.audio.heard_by(nodes, self.audio_weights()),
                     **self._search(),
+                    residual=self.residual.motion(self.fps, self.config["residual"]) if self.residual else None,
                 )
             )
         return self._speaker
@@ -332,6 +339,7 @@ class Efase(Method):
         """Another model that knows what this one learned, but no nodes."""
         other = type(self).from_config({**self.config, **weights})
         other.audio.share(self.audio)
+        other.residual = self.residual if other.residual is not None else None
         other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
         other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
         other.register_buffer("rest", self.rest)

@@ -1,6 +1,6 @@
 """How much a mean over many motions must be sharpened: it moves too little."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,26 +12,27 @@ SHARES = np.linspace(0, 2, 9)
 """Where a share is looked for; more would be a caricature."""
 
 
-def matching_share(pairs: Iterable[tuple[Motion, Motion]]) -> float:
+def matching_share(pairs: Iterable[tuple[Motion, Motion]], points: Sequence[int] | None = None) -> float:
     """The share with which motion moves as much as recorded, by pairs (unsharpened, recorded) of one rate.
 
     Compared are mean speeds without roughness, of which a sensor's noise would be the larger part, over the frames
-    that were recorded. From 0, where nothing is missing, to the last of SHARES.
+    that were recorded; of some points, all unless told. From 0, where nothing is missing, to the last of SHARES.
     """
-    ratios = np.mean([_speed_ratios(made, truth) for made, truth in pairs], axis=0)
+    ratios = np.mean([_speed_ratios(made, truth, points) for made, truth in pairs], axis=0)
     return float(np.interp(1.0, ratios, SHARES))
 
 
-def _speed_ratios(made: Motion, truth: Motion) -> Floats:
+def _speed_ratios(made: Motion, truth: Motion, points: Sequence[int] | None) -> Floats:
     """[S] mean speed of a motion sharpened by each of SHARES over that of the recording."""
     count, fps = min(len(made), len(truth)), truth.fps
-    recorded = _speeds(truth, without_roughness(truth.frames[:count].astype(np.float64), fps))
+    recorded = _speeds(truth, without_roughness(truth.frames[:count].astype(np.float64), fps), points)
     present = np.isfinite(recorded)
     sharp = [sharpen(made.frames[:count].astype(np.float64), share, fps) for share in SHARES]
-    made_speeds = [_speeds(made, without_roughness(frames, fps))[present].mean() for frames in sharp]
+    made_speeds = [_speeds(made, without_roughness(frames, fps), points)[present].mean() for frames in sharp]
     return np.array(made_speeds) / max(recorded[present].mean(), 1e-12)
 
 
-def _speeds(motion: Motion, frames: Floats) -> Floats:
-    """[T - 1, K] how far each point of a motion's layout goes from frame to frame."""
-    return np.asarray(np.linalg.norm(np.diff(motion.layout.points(frames), axis=0), axis=2))
+def _speeds(motion: Motion, frames: Floats, points: Sequence[int] | None) -> Floats:
+    """[T - 1, K] how far each of some points of a motion's layout, or all, goes from frame to frame."""
+    some = motion.layout.points(frames)[:, slice(None) if points is None else list(points)]
+    return np.asarray(np.linalg.norm(np.diff(some, axis=0), axis=2))

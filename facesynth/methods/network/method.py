@@ -15,6 +15,7 @@ from facesynth.inference.network import SoundStream
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.expectation import STEPS, PosePredictor
 from facesynth.methods.learn.hearing import Features
+from facesynth.methods.learn.residual import Residual
 from facesynth.methods.method import Method
 from facesynth.methods.network.capabilities import CAPABILITIES
 from facesynth.methods.registry import register
@@ -39,6 +40,8 @@ class Network(Method):
         How much quick movement is raised: the pose in the middle of the likely ones moves too little.
     close_lips : bool
         Whether lips come as near to each other at p, b and m as they were recorded to.
+    residual : float
+        How much is added of what recorded faces do beside their lips (see `inference.residual`); 1 as recorded.
     """
 
     def __init__(
@@ -49,20 +52,28 @@ class Network(Method):
         features: Features = "log_mel",
         sharpening: float = 0.0,
         close_lips: bool = False,
+        residual: float = 0.0,
     ) -> None:
         super().__init__()
-        if steps < 1 or not 0 <= sharpening < float("inf") or not look_ahead_s < float("inf"):
+        if (
+            steps < 1
+            or not 0 <= min(sharpening, residual) <= max(sharpening, residual) < float("inf")
+            or not look_ahead_s < float("inf")
+        ):
             raise FacesynthError(
-                "network needs at least one step of training, a sharpening of 0 or more and a finite look-ahead; "
-                f"got {steps}, {sharpening} and {look_ahead_s}"
+                "network needs at least one step of training, sharpening and residual of 0 or more and a finite look-ahead; "
+                f"got {steps}, {sharpening}, {residual} and {look_ahead_s}"
             )
         ahead = None if look_ahead_s < 0 else look_ahead_s
         self.predictor = PosePredictor(features, phones=phones, look_ahead_s=ahead)
+        self.residual = Residual() if residual > 0 else None
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from the complete frames of a corpus."""
         self.learned_from(corpus)
         self.predictor.learn(corpus, nn.Identity(), seed, self.config["steps"])
+        if self.residual is not None:
+            self.facts["no_residual"] = self.residual.learn(corpus)
         gaps = [
             gap
             for utterance in corpus
@@ -82,6 +93,7 @@ class Network(Method):
             self.predictor.expectation(),
             sharpening=self.config["sharpening"],
             closed_gap=np.inf if gap is None else gap,
+            residual=self.residual.motion(self.fps, self.config["residual"]) if self.residual else None,
         )
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
