@@ -15,7 +15,9 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animation
 from facesynth.face.rig.arkit import arkit_columns
 from facesynth.face.rig.arkit_rig import Rig
+from facesynth.face.rig.markers import LipGap
 from facesynth.face.solve.animate import animate
+from facesynth.face.solve.closures import with_closures_shown
 from facesynth.inference.errors import unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -119,7 +121,7 @@ class HeadStage:
         """Put a mouth's motion on the head, with what moves head and eyes beside it, at the rate asked for."""
         asked = self.request
         face = whole_face(cast, self.as_arkit(motion), speech, asked)
-        animation = animate(
+        whole = animate(
             face.motion,
             self.rig,
             eyes_gain=asked.eyes.factor,
@@ -127,8 +129,9 @@ class HeadStage:
             seed=asked.seed,
             phones=speech.phones,
             eyes=face.eyes,
-        ).resampled(float(asked.fps or FPS))
-        animation = replace(animation, sources=face.sources)
+        )
+        shown = whole.resampled(float(asked.fps or FPS))
+        animation = replace(with_closures_shown(shown, whole, LipGap.of(self.rig), speech.phones), sources=face.sources)
         skin = self._skin(face.motion, animation)
         return Performance(speech, face.motion, animation, self.own or self.rig, asked.size or SIZE, skin)
 

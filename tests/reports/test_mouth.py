@@ -88,3 +88,27 @@ def test_on_a_head_whose_mouth_close_corrects_jaw_open(tmp_path, papa):
         assert (curves["mouthClose"] <= curves["jawOpen"] + 1e-6).all()
     built_in, _ = spoken(model, papa, tmp_path)
     assert (built_in["mouthClose"] <= built_in["jawOpen"] + 0.01).all()
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.021, 0.042, 0.063])
+def test_at_12_pictures_a_second_every_closure_is_seen(tmp_path, talker, rig, late_s):
+    """pa ma ba: lips that are shut for 60 ms, wherever the pictures fall."""
+    said = [("P", "AA1"), ("M", "AA1"), ("B", "AA1"), ("P", "IY1")]
+    grid, now_s = [], 0.2 + late_s
+    for shut, wide in said:
+        grid += [(shut, now_s, now_s + 0.06), (wide, now_s + 0.06, now_s + 0.26)]
+        now_s += 0.26
+    sound = lay_down(tmp_path / "session", "pamaba", 1.6)
+    put(sound.with_suffix(".TextGrid"), long_grid([("phones", grid)], 0.0, 1.6))
+    lips = LipGap.of(rig)
+
+    def openings(fps):
+        curves, _ = spoken(talker, sound, tmp_path, "--fps", fps)
+        return lips.opening_mm(np.stack([curves[name] for name in ARKIT_NAMES], axis=1))
+
+    whole, few = openings(FPS), openings(12)
+    for _, start_s, end_s in grid[::2]:
+        closed = whole[round(start_s * FPS) : round(end_s * FPS)].min()
+        near = few[int(start_s * 12) : int(np.ceil(end_s * 12)) + 1].min()
+        assert near < closed + 0.2
+    assert few.max() > 0.6 * whole.max(), "between them the mouth opens"

@@ -12,7 +12,7 @@ from facesynth.face.rig.arkit import BLINKS, arkit_columns, gaze_of, gaze_weight
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
 from facesynth.face.rig.markers import MIDDLE_LIPS, LipGap, marker_vertices
 from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
-from facesynth.face.solve.closures import with_lips_apart, with_lips_met
+from facesynth.face.solve.closures import MOUTH, with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
@@ -21,7 +21,6 @@ from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.pose import rigid_points
 
 # On ARKit's heads mouthClose undoes jawOpen at the lips: more of it than of the jaw drives one lip through the other.
-MOUTH = tuple(i for i, name in enumerate(ARKIT_NAMES) if name.startswith(("jaw", "mouth", "tongue")))
 JAW, CLOSE = ARKIT_NAMES.index("jawOpen"), ARKIT_NAMES.index("mouthClose")
 SHUT_MM, OPEN_MM = 0.7, 2.0
 """Lips nearer than the first are shut and stay as near; wider than the second they are free; between, less and less."""
