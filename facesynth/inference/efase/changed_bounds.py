@@ -63,7 +63,7 @@ def _by_class(old: Nodes, tables: Mapping[str, NDArray[Any]]) -> tuple[Rows, Row
         leaving[name] = _in_order(tables["bounds_out"][c], order)
     for viseme in np.unique(nodes.visemes).tolist():
         j = np.flatnonzero(preceding == viseme)
-        for c in np.flatnonzero(nodes.visemes[first] == viseme):
+        for c in np.flatnonzero(nodes.visemes[first] == viseme).tolist():
             row = np.full(len(nodes), NONE, np.uint8)
             row[j] = tables["bounds_in"][at : at + len(j)]
             coming[classes[c]] = _in_order(row, order)

@@ -332,7 +332,7 @@ class Efase(Method):
         for name, array in arrays.items():
             other.register_buffer(name, torch.from_numpy(array).to(device))
         if hasattr(self, "map_points"):
-            other.register_buffer("map_points", self.map_points)
+            other.register_buffer("map_points", self.get_buffer("map_points"))
         return other
 
     def _sharing(self, weights: Mapping[str, float]) -> Self:

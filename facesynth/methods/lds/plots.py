@@ -50,7 +50,8 @@ def innovations_figure(model: LDS) -> Any:
     for axes, edge, share, kurtosis in zip(panels, edges, cumulative, model.facts["kurtosis"], strict=False):
         density = np.diff(share) / np.diff(edge)
         axes.stairs(density, edge, fill=True)
-        v = np.linspace(*np.interp(SHARES_SHOWN, share, edge), 200)
+        least, most = np.interp(SHARES_SHOWN, share, edge).tolist()
+        v = np.linspace(least, most, 200)
         axes.plot(v, _gaussian(v, edge, share), color="black", linewidth=0.8)
         axes.set(title=f"excess kurtosis {kurtosis:.1f}", yticks=[], xlim=(v[0], v[-1]))
     return figure

@@ -24,8 +24,8 @@ class Moments:
         """Of no samples."""
         return cls(0, np.zeros(inputs), np.zeros(outputs), np.zeros((inputs, inputs)), np.zeros((inputs, outputs)), 0.0)
 
-    def add(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> None:
-        """Count samples x [N, I], y [N, O]; products in float32, which standardised inputs bear, sums in float64."""
+    def add(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> None:
+        """Count samples x [N, I], y [N, O]; products in their own type (standardised inputs bear float32), sums in float64."""
         self.count += len(x)
         self.x += x.sum(axis=0, dtype=np.float64)
         self.y += y.sum(axis=0, dtype=np.float64)

@@ -91,7 +91,7 @@ def _joint_tracks(document: gl.GLTF2, animation: FaceAnimation, head: OwnHead, s
     """Rotation of each node that a channel turns."""
     tracks = []
     for joint in head.joints:
-        amounts = animation.weights_for([head.names[joint.channel]]).astype(np.float64)
+        amounts = animation.weights_for((head.names[joint.channel],)).astype(np.float64)
         rest = _as_trs(document.nodes[joint.node])
         turn = _within(_parent_place(scene, joint.node), Rotation.from_rotvec(amounts * joint.turn))
         tracks.append(rotation_track(joint.node, turn * Rotation.from_quat(rest.rotation)))
