@@ -1,8 +1,11 @@
 """Phones and words in files that people edit: Praat's TextGrid, and lines of `end label`."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.encoding import decoded
@@ -18,6 +21,13 @@ Words = tuple[Segment, ...]
 """Word, start and end in seconds; silence between words is left out."""
 SAME_LENGTH_S = 0.2
 """A stretch of labels and a sound whose lengths differ by no more are of the same thing."""
+FAR_BEYOND = 50
+"""Whole numbers that go so many times beyond the sound's end are no seconds."""
+UNITS_S: Mapping[str, float] = {
+    **{"units of 100 ns, as HTK counts": 1e-7, "milliseconds": 1e-3},
+    **{f"samples at {rate} Hz, as TIMIT counts": 1 / rate for rate in (8000, 11025, 16000, 22050, 24000, 32000, 44100, 48000)},
+}
+_NUMBER = re.compile(r"[-+]?\d*\.?\d+(e[-+]?\d+)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +110,23 @@ def read_label_lines(path: str | Path) -> PhoneTrack:
 
 def _from_lines(path: Path, duration_s: float | None) -> Labelled:
     segments, encoding = _line_segments(path)
+    segments, counted = _in_seconds(segments, duration_s)
     start_s, end_s = (segments[0][1], segments[-1][2]) if segments else (0.0, 0.0)
     begin_s = _offset_s(start_s, end_s, duration_s)
     labels = label_remarks(label for label, _, _ in segments)
-    return Labelled(_track(path, _shifted(segments, begin_s), None), (), (*_encoded(encoding), *_moved(begin_s), *labels))
+    told = (*_encoded(encoding), *counted, *_moved(begin_s), *labels)
+    return Labelled(_track(path, _shifted(segments, begin_s), None), (), told)
+
+
+def _in_seconds(segments: list[Segment], duration_s: float | None) -> tuple[list[Segment], tuple[str, ...]]:
+    """Segments whose times are whole numbers far beyond the sound's end in the unit that fits it best, and what is said of it."""
+    last = segments[-1][2] if segments else 0.0
+    whole = all(time == int(time) for _, *times in segments for time in times)
+    if duration_s is None or not whole or last < FAR_BEYOND * duration_s:
+        return segments, ()
+    unit = min(UNITS_S, key=lambda name: abs(np.log(max(last * UNITS_S[name], 1e-12) / duration_s)))
+    seconds = [(label, start * UNITS_S[unit], end * UNITS_S[unit]) for label, start, end in segments]
+    return seconds, (f"its times go up to {last:.0f}: they were taken as {unit}",)
 
 
 def _line_segments(path: Path) -> tuple[list[Segment], str]:
@@ -113,7 +136,7 @@ def _line_segments(path: Path) -> tuple[list[Segment], str]:
     for number, line in _lines(text):
         before_s = segments[-1][2] if segments else 0.0
         try:
-            *times, label = line.split()
+            *times, label = _without_score(line.split())
             start_s, end_s = (before_s, *map(float, times))[-2:]
             if len(times) not in (1, 2) or not end_s > start_s >= before_s - 1e-6:
                 raise ValueError
@@ -124,6 +147,11 @@ def _line_segments(path: Path) -> tuple[list[Segment], str]:
             ) from None
         segments.append((label, start_s, end_s))
     return segments, encoding
+
+
+def _without_score(cells: list[str]) -> list[str]:
+    """A line without what HTK writes after a label: how likely it was."""
+    return cells[:3] if len(cells) == 4 and _NUMBER.fullmatch(cells[3]) and not _NUMBER.fullmatch(cells[2]) else cells
 
 
 # A stretch that was cut out of a longer file may keep its times there: then it is as long as the sound, but does not lie in it.
@@ -192,6 +220,10 @@ def _text_of(path: Path) -> tuple[str, str]:
 
 
 def _lines(text: str) -> Iterable[tuple[int, str]]:
-    """Number and text of each line that says something."""
-    stripped = ((number, line.strip()) for number, line in enumerate(text.splitlines(), start=1))
-    return ((number, line) for number, line in stripped if line and not line.startswith("#"))
+    """Number and text of each line that says something; of files of xwaves (header, `#`, `end colour label`) end and label."""
+    stripped = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    head = next((k for k, (_, line) in enumerate(stripped) if line == "#"), -1)
+    said = [(number, line) for number, line in stripped[head + 1 :] if line and not line.startswith("#")]
+    if head < 0 or not any(_NUMBER.fullmatch(line.split()[1]) for _, line in said if len(line.split()) == 3):
+        return said
+    return [(number, f"{line.split()[0]} {line.split()[-1]}") for number, line in said]

@@ -61,3 +61,29 @@ def test_another_sounds_labels_are_refused(tmp_path, talker):
     sound = lay_down(tmp_path / "session", "a", 3.0)
     code, _, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--phones", put(tmp_path / "a.TextGrid", moved(10.0)))
     assert (code, "ends at 11.00 s, the sound at 3.00 s" in said) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("factor", "end", "unit"),
+    [
+        (1e7, "", "100 ns"),
+        (1e7, " -812.4", "100 ns"),
+        (16000, "", "16000 Hz"),
+        (44100, "", "44100 Hz"),
+        (1000, "", "milliseconds"),
+    ],
+)
+def test_lines_in_other_units(tmp_path, talker, factor, end, unit):
+    """HTK counts in 100 ns and may add a score, TIMIT in samples."""
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    lines = "".join(f"{factor * start:.0f} {factor * stop:.0f} {label}{end}\n" for label, start, stop in PHONES)
+    curves, facts = spoken(talker, sound, tmp_path, "--phones", put(tmp_path / "a.lab", lines))
+    assert closing(curves) == pytest.approx(0.6, abs=0.021)
+    assert any("they were taken as" in line and unit in line for line in facts["remarks"])
+
+
+def test_lines_of_xwaves(tmp_path, talker):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    lines = "signal a\nnfields 1\n#\n" + "".join(f"    {stop:.5f}  121 {label}\n" for label, _, stop in PHONES)
+    curves, _ = spoken(talker, sound, tmp_path, "--phones", put(tmp_path / "a.lab", lines))
+    assert closing(curves) == pytest.approx(0.6, abs=0.021)

@@ -101,7 +101,7 @@ def _knots(phones: PhoneTrack) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     One in the middle of each phone; two, HOLD_S inside both ends, for a phone that is longer than both together.
     """
     starts, ends = phones.starts_s, phones.ends_s
-    long = ends - starts > 2 * HOLD_S
+    long = ends - starts > 2 * HOLD_S + 1e-6  # else both would lie in one place, give or take the rounding of times
     first = np.where(long, starts + HOLD_S, (starts + ends) / 2)
     index = np.arange(len(phones))
     times = np.concatenate([first, ends[long] - HOLD_S])
