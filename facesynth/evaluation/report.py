@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from facesynth.atomic import write_text
-from facesynth.corpus import Corpus
+from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
 from facesynth.evaluation.contestants import SECOND_TAKE, Family, references
 from facesynth.evaluation.curve import LIVELY, MEASURES, Curve, Measure, Point
 from facesynth.evaluation.curve_figure import curve_figure
 from facesynth.evaluation.details import Details
+from facesynth.evaluation.drawing import RECORDED, head_figure
 from facesynth.evaluation.exports import best_labels, write_exports
 from facesynth.evaluation.face_video import worst_shown, write_side_by_side
 from facesynth.evaluation.family_figure import family_figure
@@ -198,14 +199,26 @@ def _shown(
     for utterance_id in track(wish.shown or typical(result), "pictures"):
         utterance = corpus[utterance_id]
         motions = {label: made for label in order if (made := read_motion(corpus, result.predictions, label, utterance_id))}
-        drawn = {label: motions[label] for label in labels if label in islice(motions, MOST_SHOWN)}
+        faces = {label: made for label, made in motions.items() if len(result.details[label].points)}
+        drawn = {label: faces[label] for label in labels if label in islice(faces, MOST_SHOWN)}
         yield {
             "id": utterance_id,
             "text": utterance.speech.text,
             "emotion": utterance.emotion,
             "trajectories": trajectory_figure(utterance, drawn, colours),
-            "video": _video(utterance_id, corpus, dict(islice(motions.items(), MOST_PANELS)), face, worst) if wish.videos else "",
+            "heads": _heads(utterance, motions),
+            "video": _video(utterance_id, corpus, dict(islice(faces.items(), MOST_PANELS)), face, worst) if wish.videos else "",
         }
+
+
+def _heads(utterance: Utterance, motions: Mapping[str, Motion]) -> str:
+    """The heads of an utterance; nothing where nobody recorded one, or no method moves one."""
+    recorded = utterance.motion.head
+    moved = {label: one.head for label, one in motions.items() if one.head is not None and label != SECOND_TAKE}
+    if recorded is None or not moved:
+        return ""
+    heads = {RECORDED: recorded, **dict(islice(moved.items(), MOST_SHOWN))}
+    return head_figure(utterance.motion.fps, {label: np.nan_to_num(head).astype(np.float64) for label, head in heads.items()})
 
 
 def _video(utterance_id: str, corpus: Corpus, motions: Mapping[str, Motion], face: PointFace, worst: float) -> str:

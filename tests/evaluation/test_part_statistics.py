@@ -63,6 +63,7 @@ def test_their_page_is_written(compared):
     corpus, result, folder = compared
     page = write_report(folder, result, corpus, [], Wish("heads", videos=False)).read_text(encoding="utf-8")
     assert "head_speed" in page
+    assert 'alt="head of n0' in page
     assert "the method moves the head alone" in page
 
 

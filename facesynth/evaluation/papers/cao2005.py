@@ -6,9 +6,9 @@ from functools import lru_cache
 import numpy as np
 
 from facesynth.evaluation.cost import stopwatch
+from facesynth.evaluation.drawing import RECORDED, bars_figure, lines_figure, tracks_figure
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2008 import Stated, trajectories
-from facesynth.evaluation.papers.drawing import RECORDED, bars_figure, lines_figure, tracks_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.evaluation.papers.joined import joined, phones_until

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from facesynth.evaluation.drawing import variance_figure
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import SPEECH
 from facesynth.evaluation.papers.deng2008 import database, published, spoken, times, trajectories
-from facesynth.evaluation.papers.drawing import variance_figure
 from facesynth.evaluation.papers.figure import Figure
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.evaluation.papers.phone_maps import maps

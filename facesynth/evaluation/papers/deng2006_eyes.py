@@ -4,11 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from facesynth.evaluation.drawing import RECORDED, tracks_figure
 from facesynth.evaluation.eyes import distances
 from facesynth.evaluation.figures import as_uri, new_figure
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.drawing import RECORDED, tracks_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.inference.errors import FacesynthError

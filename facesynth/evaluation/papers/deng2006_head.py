@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from facesynth.corpus import Utterance
+from facesynth.evaluation.drawing import RECORDED, head_figure, lines_figure
 from facesynth.evaluation.head import canonical_correlation, head_cca, head_distances
 from facesynth.evaluation.pair import Array
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.drawing import RECORDED, lines_figure, tracks_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.inference.head.hmm import HEARD_FPS
@@ -18,7 +18,6 @@ from facesynth.inference.head.keys import HeadKeys
 from facesynth.inference.head.knn import HeadKnn
 from facesynth.inference.head.voice import prosody_of
 from facesynth.inference.motion import Motion
-from facesynth.inference.quaternions import from_rotvec, one_hemisphere, to_angles
 from facesynth.methods.head_hmm.method import HeadHmmMethod
 from facesynth.methods.head_knn.method import HeadKnnMethod, segment_of
 from facesynth.methods.head_knn.weights import Found, search_weights
@@ -45,7 +44,6 @@ TABLE: tuple[tuple[dict[str, Any], str], ...] = (
 """Configurations of table 4.1 and what the dissertation prints of them."""
 
 
-ANGLES = ("pitch, °", "yaw, °", "roll, °")
 SHOWN = 2
 """Row of the table that is drawn: the one that the dissertation goes on with."""
 
@@ -140,11 +138,7 @@ def _ends(utterance: Utterance) -> HeadKeys:
 
 
 def _picture(utterance: Utterance, made: Mapping[str, Array]) -> str:
-    """Three angles over time."""
-    heads = {RECORDED: poses_of(utterance), **made}
-    angles = {label: np.degrees(to_angles(one_hemisphere(from_rotvec(poses[:, :3])))) for label, poses in heads.items()}
-    panels = {name: {label: track[:, k] for label, track in angles.items()} for k, name in enumerate(ANGLES)}
-    return tracks_figure(utterance.motion.fps, panels)
+    return head_figure(utterance.motion.fps, {RECORDED: poses_of(utterance), **made})
 
 
 def _off(made: Array, truth: Motion) -> Array:

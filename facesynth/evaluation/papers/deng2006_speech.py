@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 
 from facesynth.corpus import Corpus
+from facesynth.evaluation.drawing import lines_figure, variance_figure
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2008 import trajectories
-from facesynth.evaluation.papers.drawing import lines_figure, variance_figure
 from facesynth.evaluation.papers.figure import Figure
 from facesynth.evaluation.papers.finding import Finding
 from facesynth.inference.errors import FacesynthError

@@ -7,11 +7,11 @@ import numpy as np
 
 from facesynth.corpus import Utterance
 from facesynth.evaluation.cost import stopwatch
+from facesynth.evaluation.drawing import lines_figure, variance_figure
 from facesynth.evaluation.figures import COLOURS
 from facesynth.evaluation.geometry import deng_error, deng_errors
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.papers import Material
-from facesynth.evaluation.papers.drawing import lines_figure, variance_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, not_available, values
 from facesynth.evaluation.papers.joined import joined

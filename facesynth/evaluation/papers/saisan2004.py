@@ -5,11 +5,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from facesynth.evaluation.drawing import lines_figure
 from facesynth.evaluation.figures import as_uri
 from facesynth.evaluation.pair import distances, paired_points
 from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2008 import Spoken, Stated, trajectories
-from facesynth.evaluation.papers.drawing import lines_figure
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.evaluation.trajectories import shown_channels

@@ -1,4 +1,4 @@
-"""Pictures that several papers' figures are drawn as; each is a data URI, as all of `facesynth.evaluation.figures`."""
+"""Lines, bars and signals over time, as reports and papers' figures draw them; each is a data URI."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike
 
 from facesynth.evaluation.figures import as_uri, colour_of, new_figure
 from facesynth.evaluation.pair import Array
+from facesynth.inference.quaternions import from_rotvec, one_hemisphere, to_angles
 
 RECORDED = "recorded"
 """The signal of this name is drawn black and first."""
+ANGLES = ("pitch, °", "yaw, °", "roll, °")
 SMALL = {"fontsize": 8, "frameon": False}
 
 
@@ -58,6 +60,12 @@ def tracks_figure(fps: float, panels: Mapping[str, Mapping[str, Array]], longest
     axes[-1, 0].set(xlabel="s")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), **SMALL, ncols=4, loc="outside upper center")
     return as_uri(figure)
+
+
+def head_figure(fps: float, heads: Mapping[str, Array]) -> str:
+    """Three angles of heads [T, 6] by label, over time."""
+    angles = {label: np.degrees(to_angles(one_hemisphere(from_rotvec(poses[:, :3])))) for label, poses in heads.items()}
+    return tracks_figure(fps, {name: {label: track[:, k] for label, track in angles.items()} for k, name in enumerate(ANGLES)})
 
 
 def variance_figure(shares: Sequence[float] | Array, used: int) -> str:
