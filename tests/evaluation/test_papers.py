@@ -138,6 +138,14 @@ def test_the_dissertations_heads_are_refused_where_nobody_recorded_one(tmp_path)
     assert all("head pose" in one.why for one in headless)
 
 
+def test_the_dissertations_heads_through_key_poses_are_measured_and_drawn(tmp_path):
+    corpus = nodding_corpus(tmp_path / "nods", 6)
+    (off,) = HEAD[1].findings(Material(corpus, corpus.subset(corpus.ids[:4]), corpus.subset(corpus.ids[4:]), 0))
+    assert off.where == "fig. 4.6"
+    assert off.figure.startswith("data:image/")
+    assert 0 < float(off.ours.split(" / ")[0]) < 45
+
+
 def test_a_page_shows_every_figure_and_its_picture_and_files_hold_no_pictures():
     rows = (
         Finding("fig. 1", "a <curve>", "3", "4", False, "other", figure="data:image/png;base64,AAAA"),
