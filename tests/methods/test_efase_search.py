@@ -1,5 +1,6 @@
 """The search against the literal recursion, pair by pair, in plain Python."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,28 @@ def test_changing_one_constraint_leaves_distant_choices_alone():
     assert fixed[20] == other
     changed = np.flatnonzero(fixed != base)
     assert np.abs(changed - 20).max() < 15
+
+
+def test_a_constraint_far_from_all_that_is_near_is_found_exactly_in_little_memory():
+    rng = np.random.default_rng(8)
+    nodes, weights = random_nodes(rng, 1500, phones=30, emotions=3, width=4), Weights(3000.0, delta=0.06)
+    index = SearchIndex(nodes, weights, step_bounds(nodes, weights))
+    steps_of_all = np.concatenate(
+        [steps.step_matrix(nodes, part, np.arange(1500), weights) for part in np.split(np.arange(1500), 6)]
+    )
+    for at in (5, 9, 16):
+        query = random_query(rng, nodes, 20, phones=30, emotions=3)
+        targets = all_targets(nodes, replace(query, fixed={at: int(rng.integers(1500))}, strict=None), weights)
+        tracemalloc.start()
+        path = index.cheapest_path(targets)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        phi = targets[0]
+        for target in targets[1:]:
+            phi = (phi[:, None] + steps_of_all).min(axis=0) + target
+        found = targets[np.arange(20), path].sum() + steps.step_costs(nodes, path[:-1], path[1:], weights).sum()
+        np.testing.assert_allclose(found, phi.min(), rtol=1e-9)
+        assert most < 80e6
 
 
 @pytest.mark.parametrize("shortest", [1, 3])

@@ -28,7 +28,7 @@ from ..arrays import Floats, Ints
 from ..efase.bounds import StepBounds, class_order
 from ..efase.costs import Weights
 from ..efase.nodes import Nodes
-from ..efase.steps import end_vectors, squared_distances, start_vectors, step_costs
+from ..efase.steps import bends, end_vectors, squared_distances, start_vectors, step_costs
 from ..errors import FacesynthError
 
 BEAM = 32
@@ -43,6 +43,16 @@ MARGIN = 1e-5
 """Of upper bounds: tables and bounds are in single precision."""
 MANY = 300
 """Nodes a phone, on average, for which a better upper bound is worth looking for."""
+REJOINED = 4
+"""Phones back to where a path is looked for that reaches a node which the beam did not expect."""
+WIDE = 2000
+"""Nodes at each of those that it may go through."""
+FEW = 4
+"""Nodes to which steps are computed one by one, in place of bounds of classes."""
+PAIRS = 1 << 19
+"""Pairs of nodes that are looked at together, so that no constraint takes memory without end."""
+ASTRAY = 0.5
+"""How far, in PNT, the beam may be above the bound: a phone said with the wrong neighbours costs PNT."""
 EVERY = 8
 """Phones after which what may be on the best path so far is made exact: bounds upon bounds grow loose."""
 UNKNOWN, START = -2, -1
@@ -127,8 +137,12 @@ class Search:
         here = Position(targets, phi, back)
         here.beam, here.upper = self._beam(here)
         self.positions.append(here)
-        if len(self) % EVERY == 0:
+        if len(self) % EVERY == 0 or self._astray(here):
             self._solve()
+
+    def _astray(self, here: Position) -> bool:
+        """Whether the beam lost its way, as it may at a hard constraint: far above the bound, or too narrow to be one."""
+        return len(here.upper) < BEAM or float(here.upper.min() - here.phi.min()) > ASTRAY * self.weights.pnt
 
     def path(self) -> Ints:
         """[T] the nodes of the cheapest path to the newest phone."""
@@ -165,10 +179,9 @@ class Search:
             here.phi -= cost
             known = np.flatnonzero(here.back != UNKNOWN)
             here.back[known[before.back[here.back[known]] == UNKNOWN]] = UNKNOWN
-        newest = self.positions[-1]
-        known = np.flatnonzero(newest.back != UNKNOWN)
-        newest.beam = known[np.argsort(newest.phi[known], kind="stable")[:BEAM]]
-        newest.upper = newest.phi[newest.beam]
+            known = np.flatnonzero(here.back != UNKNOWN)
+            here.beam = known[np.argsort(here.phi[known], kind="stable")[:BEAM]]
+            here.upper = here.phi[here.beam]
 
     def _beam(self, here: Position) -> tuple[Ints, Floats]:
         """Real paths to nodes of small bounds and to those that were recorded after the last beam."""
@@ -206,21 +219,61 @@ class Search:
     def _solve(self) -> None:
         """Make phi known for every node at the newest phone that may be its best, and for all on the way there."""
         limit = _limit(self.positions[-1].upper)
+        if len(self) > 1 and self._astray(self.positions[-1]):
+            limit = min(limit, _limit(self._rejoined()))
         kept = self._backwards(limit)
         if sum(len(some.nodes) for some in kept) > MANY * len(kept):
-            limit = min(limit, _limit(self._led(kept)))
+            first = 0 if len(kept[0].nodes) else 1  # nothing before what is known already
+            start = kept[first].nodes[self.positions[first - len(kept)].back[kept[first].nodes] != UNKNOWN]
+            limit = min(limit, _limit(self._led(kept[first + 1 :], start, self.positions[first - len(kept)].phi[start])))
             kept = self._backwards(limit)
         for t in range(len(self) - len(kept) + 1, len(self)):
             self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
+        self._widen(self.positions[-1])
 
-    def _led(self, kept: list[Kept]) -> Floats:
-        """Costs of paths to the newest phone, found by a beam that knows both bounds: where the first beam went astray."""
-        i, phi = kept[0].nodes, self.positions[-len(kept)].phi[kept[0].nodes]
-        for position, some in zip(self.positions[1 - len(kept) :] if len(kept) > 1 else [], kept[1:], strict=True):
+    def _widen(self, here: Position) -> None:
+        """The beam goes on from what is exact, too."""
+        known = np.flatnonzero(here.back != UNKNOWN)
+        known = known[_least(here.phi[known], BEAM)]
+        beam, upper = np.concatenate([known, here.beam]), np.concatenate([here.phi[known], here.upper])
+        order = np.argsort(upper, kind="stable")
+        beam, first = np.unique(beam[order], return_index=True)
+        best = order[first][np.argsort(upper[order[first]], kind="stable")[:BEAM]]
+        here.beam, here.upper = np.concatenate([known, here.beam])[best], upper[best]
+
+    def _rejoined(self) -> Floats:
+        """Costs of paths to the newest phone, found from its end: its nearest nodes, what leads best to them, and so on.
+
+        A few phones back it joins the beam of there, which did not know of what came.
+        """
+        last, before = self.positions[-1], self.positions[-2 : -2 - REJOINED : -1]
+        j = _least(last.phi, FEW)
+        value, sets = last.targets[j], [Kept(j, np.ones(len(j), bool), np.zeros(len(j)))]
+        for position in before:
+            i = _least(position.phi, WIDE)
+            rest = self._onward(i, j, value)
+            near = np.argsort(position.phi[i] + rest, kind="stable")[: 2 * BEAM]
+            sets.append(Kept(i[near], np.ones(len(near), bool), rest[near]))
+            j, value = i[near[:FEW]], rest[near[:FEW]] + position.targets[i[near[:FEW]]]
+        first = self.positions[-len(sets)]
+        if len(sets) == len(self):
+            start = sets.pop().nodes
+            return self._led(sets[::-1], start, first.phi[start])
+        joined = self.positions[-len(sets) - 1]
+        return self._led(sets[::-1], joined.beam, joined.upper)
+
+    def _led(self, kept: list[Kept], i: Ints, phi: Floats) -> Floats:
+        """Costs of paths to the newest phone, found by a beam that knows both bounds: where the first beam went astray.
+
+        kept: of the last phones; i and phi [n]: nodes, and what paths to them cost, of the phone before those.
+        """
+        if not kept:
+            return phi
+        for position, some in zip(self.positions[-len(kept) :], kept, strict=True):
             whole = position.phi[some.nodes] + some.rest
             j = some.nodes[np.argsort(whole, kind="stable")[: 2 * BEAM]]
             j = np.union1d(j, np.intersect1d(self.bounds.following(i), some.nodes))
-            phi = self._reached(i, phi, j) + position.targets[j]
+            phi = np.where(position.back[j] == UNKNOWN, self._reached(i, phi, j) + position.targets[j], position.phi[j])
             best = np.argsort(phi, kind="stable")[: 2 * BEAM]
             i, phi = j[best], phi[best]
         return phi
@@ -236,10 +289,29 @@ class Search:
                 break
             value = found[-1].rest[found[-1].unknown] + after.targets[j]
             i = np.flatnonzero(position.phi <= limit - value.min())
-            rest = self.bounds.backward(j, value, i)
+            rest = self._onward(i, j, value) if len(j) <= FEW else self.bounds.backward(j, value, i)
             left = position.phi[i] + rest <= limit
             found.append(Kept(i[left], position.back[i[left]] == UNKNOWN, rest[left]))
         return found[::-1]
+
+    def _onward(self, i: Ints, j: Ints, value: Floats) -> Floats:
+        """[n] min over few nodes j [m] of TC(i, j) + value(j), rounded down, for the nodes i [n].
+
+        A hard constraint may be far from all that is near otherwise. The bounds of classes know of a class what its nearest
+        node costs, and would leave half of the database to be looked at before such a node.
+        """
+        nodes, w, least = self.nodes, self.weights, np.full(len(i), np.inf)
+        for node, after, cost in zip(j.tolist(), value.tolist(), self._joints(i, j), strict=True):
+            before = int(nodes.before[node])
+            if before < 0:
+                least = np.minimum(least, after + w.alpha * w.pnt)
+                continue
+            alike = np.flatnonzero(nodes.visemes[i] == nodes.visemes[before])
+            if len(alike):
+                cost[alike] += w.beta * bends(nodes, i[alike], np.array([before]))[:, 0] * (1 - MARGIN)
+            cost[i == before] = 0.0
+            least = np.minimum(least, after + cost)
+        return least
 
     def _forwards(self, t: int, i: Ints, kept: Kept, limit: float) -> None:
         """phi of the nodes that are not known at position t, from the nodes i before it."""
@@ -250,7 +322,10 @@ class Search:
             here.phi[j] = np.maximum(here.phi[j], limit - rest)
             return
         target = here.targets[j]
-        best, origin = self._cheapest(i, last.phi[i], j, limit - rest - target)
+        most = limit - rest - target
+        parts = np.array_split(np.arange(len(j)), -(-len(i) * len(j) // PAIRS))
+        found = [self._cheapest(i, last.phi[i], j[part], most[part]) for part in parts]
+        best, origin = (np.concatenate(column) for column in zip(*found, strict=True))
         phi, exact = best + target, best + target + rest <= limit
         here.phi[j] = np.where(exact, phi, np.maximum(here.phi[j], limit - rest))
         here.back[j[exact]] = origin[exact]
@@ -292,6 +367,12 @@ class Search:
         row, node, cost = row[ahead], i[column[ahead]], cost[ahead]
         better = (cost < best[row]) | ((cost == best[row]) & (numbers[node] < numbers[origin[row]]))
         best[row[better]], origin[row[better]] = cost[better], node[better]
+
+
+def _least(values: Floats, count: int) -> Ints:
+    """Where the least values are, at most so many, and none that are infinite."""
+    chosen = np.argpartition(values, count - 1)[:count] if len(values) > count else np.arange(len(values))
+    return chosen[values[chosen] < np.inf]
 
 
 def _limit(upper: Floats) -> float:
