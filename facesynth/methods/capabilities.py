@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
+    from facesynth.corpus.journal import Edits
     from facesynth.inference.motion import Motion
     from facesynth.inference.speech import Speech
     from facesynth.motion.maps.phone_map import Kind, PhoneMap
@@ -174,6 +175,10 @@ class Browsing(Protocol):
 
     def phone_map(self, phone: str, kind: Kind = "isomap") -> PhoneMap:
         """The frames of one phone's nodes on a plane."""
+        ...
+
+    def edited(self, edits: Edits | None) -> Browsing:
+        """The same without nodes that were removed, and with those that were drawn."""
         ...
 
 

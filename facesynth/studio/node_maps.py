@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus
-from facesynth.corpus.journal import ADDED, parse_node
+from facesynth.corpus.journal import ADDED, Journal, parse_node
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.methods.capabilities import Browsing
 from facesynth.methods.method import Method
@@ -33,10 +34,10 @@ class Picked:
 
 
 class NodeMaps:
-    """The maps of one model, made when they are asked for."""
+    """The maps of one model, made when they are asked for. edits: a file of nodes that were removed and drawn."""
 
-    def __init__(self, model: Method) -> None:
-        self._model = require(model, Browsing)
+    def __init__(self, model: Method, edits: Path | None = None) -> None:
+        self._model = require(model, Browsing).edited(Journal(edits).sum() if edits else None)
         self._made: dict[tuple[str, str], PhoneMap] = {}
 
     def phones(self) -> tuple[str, ...]:

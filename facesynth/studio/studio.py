@@ -18,7 +18,7 @@ from facesynth.studio.library import Signature, corpus_facts, differing, recorde
 from facesynth.studio.messages import project_facts
 from facesynth.studio.node_maps import NodeMaps
 from facesynth.studio.performing import Performing, Shown, model_facts
-from facesynth.studio.project import Kept, Project
+from facesynth.studio.project import NODES, Kept, Project
 from facesynth.studio.speak_files import arguments, request_of
 
 LOOK_EVERY_S = 2.0
@@ -45,7 +45,7 @@ class Studio:
         self.project, self.corpus, self.model, self.performing = project, Corpus.open(corpus), model, performing
         self.windows: set[Window] = set()
         self.jobs = Jobs(self._tell_job)
-        self._maps: tuple[Performing, NodeMaps] | None = None
+        self._maps: tuple[tuple[Performing, int], NodeMaps] | None = None
         self._thread = ThreadPoolExecutor(1, "studio")
         self._seen: Signature = signature(self.corpus.path, model)
 
@@ -91,8 +91,9 @@ class Studio:
     def require_maps(self) -> NodeMaps:
         """The maps of the model's nodes; FacesynthError where it has none."""
         performing = self.require_performing()
-        if self._maps is None or self._maps[0] is not performing:
-            self._maps = performing, NodeMaps(performing.model)
+        known = performing, self.project.changed_at.get(NODES, 0)
+        if self._maps is None or self._maps[0] != known:
+            self._maps = known, NodeMaps(performing.model, self.project.edits)
         return self._maps[1]
 
     async def show(self, line: str, take: str) -> Shown:

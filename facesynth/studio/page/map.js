@@ -31,7 +31,8 @@ export async function begin() {
   kindList.addEventListener("change", () => load(true));
   emotionList.addEventListener("change", () => load(true));
   watch("selection choice", follow);
-  watch("choices project", redraw);
+  watch("choices", redraw);
+  watch("project", () => load(false));
   watch("time", () => !sound.playing() && mark());
   canvas.addEventListener("pointermove", moved);
   canvas.addEventListener("pointerdown", down);
@@ -65,7 +66,7 @@ function follow() {
 function load(again) {
   if (!store.model?.mapped.length || !phoneList.value || !canvas.clientWidth) return redraw();
   const facts = { phone: phoneList.value, map: kindList.value, emotion: emotionList.value, size: [canvas.clientWidth, Math.max(canvas.clientHeight, 16)] };
-  const key = JSON.stringify(facts);
+  const key = JSON.stringify([facts, store.project.removed, store.project.drawn]);
   if (key === asked && !again) return mark();
   if (key !== asked) ask("map", facts).then(mark).catch((error) => say(error.message, true));
   asked = key;
@@ -78,6 +79,7 @@ const mine = (message) => message.phone === phoneList.value && message.map === k
 function heardMap(message) {
   if (!mine(message)) return;
   if (map?.phone !== message.phone || map?.map !== message.map) chosen = drawing = null;
+  if (chosen && !message.nodes.includes(chosen)) chosen = null;
   const starts = [];
   message.lengths.reduce((sum, length) => (starts.push(sum), sum + length), 0);
   map = { ...message, points: message.numbers, starts, place: new Map(message.nodes.map((node, k) => [node, k])) };
