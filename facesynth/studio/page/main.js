@@ -10,7 +10,7 @@ import * as map from "/page/map.js";
 import * as recording from "/page/recording.js";
 import * as exporting from "/page/export.js";
 import * as corpus from "/page/corpus.js";
-import { all as wholeLine } from "/page/view.js";
+import { beginning } from "/page/view.js";
 import { measured, faceCame, timed, next } from "/page/measure.js";
 
 const byId = (id) => document.getElementById(id);
@@ -31,7 +31,7 @@ async function begin() {
   watch("time", () => (byId("clock").textContent = `${sound.time().toFixed(3)} s`));
   watch("time", run);
   watch("choice project", lists);
-  watch("choice", () => Promise.resolve(sound.loadLine()).then(wholeLine).then(timeline.draw));
+  watch("choice", () => Promise.resolve(sound.loadLine()).then(beginning).then(timeline.draw));
   connect();
 }
 

@@ -4,7 +4,7 @@ import { ask, lastNumber } from "/page/link.js";
 import { store, watch, changed, currentTake, changeTake, startOf, indexAt, duration, seen, sightFrom, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
 import { trialAsked } from "/page/measure.js";
-import { view, x, at, all, zoom, scroll, follow, snapped } from "/page/view.js";
+import { view, x, at, all, beginning, zoom, scroll, follow, snapped } from "/page/view.js";
 import * as lanes from "/page/lanes.js";
 
 const canvas = document.getElementById("timeline-canvas");
@@ -20,7 +20,7 @@ export function begin() {
   new ResizeObserver(fit).observe(canvas);
   watch("project selection motion choices recording time", draw);
   watch("choice", () => {
-    all();
+    beginning();
     draw();
   });
   watch("motion", listCurves);
@@ -118,7 +118,8 @@ function laneAt(y) {
 /** The boundary within reach of a place, or -1; the last end is that of the sound and stays. */
 function boundaryAt(rows, place) {
   const k = indexAt(rows, at(place));
-  const near = [k - 1, k].filter((n) => n >= 0 && n < rows.length - 1 && Math.abs(x(rows[n][1]) - place) < 6);
+  const reach = Math.min(6, (x(rows[k][1]) - x(k > 0 ? rows[k - 1][1] : 0)) / 3); // of a narrow phone most is left to be clicked
+  const near = [k - 1, k].filter((n) => n >= 0 && n < rows.length - 1 && Math.abs(x(rows[n][1]) - place) < reach);
   return near.sort((a, b) => Math.abs(x(rows[a][1]) - place) - Math.abs(x(rows[b][1]) - place))[0] ?? -1;
 }
 

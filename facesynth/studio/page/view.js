@@ -13,6 +13,13 @@ export function all() {
   view.end = Math.max(duration(), SHORTEST_S);
 }
 
+const FIRST_S = 7; // of a long line so much is shown at first: its phones can be read and clicked
+
+export function beginning() {
+  all();
+  view.end = Math.min(view.end, FIRST_S);
+}
+
 /** Come nearer (factor below 1) or go further, about a time. */
 export function zoom(factor, about) {
   const length = Math.min(Math.max((view.end - view.start) * factor, SHORTEST_S), Math.max(duration(), SHORTEST_S));
