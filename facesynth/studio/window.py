@@ -189,6 +189,11 @@ class SocketWindow:
         path = str(self._studio.corpus.path)
         return {"job": self._studio.jobs.start("check the corpus", ["corpus", "check", path, "--json"]).facts()}
 
+    async def _op_suspects(self, _message: dict[str, Any]) -> dict[str, Any]:
+        model = ["--model", str(self._studio.model)] if self._studio.model else []
+        arguments = ["corpus", "edit", "suspects", str(self._studio.corpus.path), *model, "--json"]
+        return {"job": self._studio.jobs.start("find suspicious nodes", arguments).facts()}
+
     async def _op_align(self, message: dict[str, Any]) -> dict[str, Any]:
         ids = [word for name in message["ids"] for word in ("--id", str(name))]
         force = ["--force"] if message.get("force") is True else []

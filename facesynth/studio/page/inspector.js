@@ -6,6 +6,7 @@ import * as sound from "/page/sound.js";
 import { make, labelled, choice, refill } from "/page/dom.js";
 import { qualityOf } from "/page/lanes.js";
 import { choosePhone } from "/page/timeline.js";
+import { lookAt } from "/page/map.js";
 
 const panel = document.getElementById("inspector");
 const PHONES = "pau ae ax ah aa ao y iy ih ay aw ey eh el em en er b p m r k g ng f v ow oy th dh hh ch sh jh n d t l s z zh w uw uh".split(" ");
@@ -23,7 +24,7 @@ export function begin() {
     turnTo(next);
     document.getElementById(`show-${next}`).focus();
   });
-  watch("project choice selection choices", show);
+  watch("project choice selection choices jobs", show);
 }
 
 export function turnTo(name) {
@@ -199,7 +200,21 @@ function showNodes() {
     removed.includes(node) ? null : make("button", { textContent: `Use at phone ${store.phone}`, "aria-label": `Use ${node} at phone ${store.phone}`, onclick: () => changeTake("pin", { phone: store.phone, node }, `${node} is used`) }),
     removed.includes(node) ? null : make("button", { textContent: "Remove", "aria-label": `Remove ${node}`, onclick: () => change("remove_node", { node }) })));
   const none = make("p", { className: "note", textContent: store.model?.edits ? "none" : "This model takes no edits of its nodes." });
-  return [make("h3", { textContent: "Removed nodes" }), ...(gone.length ? gone : [none]), make("h3", { textContent: "Drawn nodes" }), ...(made.length ? made : [none.cloneNode(true)])];
+  return [...suspects(removed), make("h3", { textContent: "Removed nodes" }), ...(gone.length ? gone : [none]), make("h3", { textContent: "Drawn nodes" }), ...(made.length ? made : [none.cloneNode(true)])];
+}
+
+/** Nodes that had better be looked at, the worst first, as the newest search for them found. */
+function suspects(removed) {
+  if (!store.model?.mapped.length) return [];
+  const job = [...store.jobs.values()].reverse().find((one) => one.title === "find suspicious nodes");
+  const find = make("button", { id: "find-suspects", textContent: "Find them", disabled: job?.code === null, onclick: () => ask("suspects").catch((error) => say(error.message, true)) });
+  const head = make("div", { className: "row" }, make("h3", { textContent: "Suspicious nodes" }), find, make("span", { textContent: job?.code === null ? "looking …" : "" }));
+  if (job?.code !== 0) return [head];
+  const rows = JSON.parse(job.output).suspects.filter(({ node }) => !removed.includes(node)).map(({ node, phone, reasons }) => make("div", { className: "row" },
+    make("button", { textContent: node, "aria-label": `Look at ${node}`, onclick: () => lookAt(phone, node) }),
+    store.model.edits ? make("button", { textContent: "Remove", "aria-label": `Remove ${node}`, onclick: () => change("remove_node", { node }, `${node} is not used any more`) }) : null,
+    make("span", { className: "note", textContent: `${phone}: ${reasons.join("; ")}` })));
+  return [head, ...(rows.length ? rows : [make("p", { className: "note", textContent: "none is left" })])];
 }
 
 const OF_SPEAK = [

@@ -94,15 +94,18 @@ export function drawPhones(c, lane, take) {
 /** Shape and word say what colour says too: ● right phone, ◐ right viseme, ○ other; a bar joins nodes recorded in a row. */
 export function drawNodes(c, lane, take) {
   const pins = new Map(take.pins);
-  const middle = lane.top + lane.height / 2;
+  const y = lane.top + lane.height / 2;
   each(take.phones, (k, _label, start, end) => {
     const row = store.choices[k];
     const quality = qualityOf(row);
     if (quality) {
-      const mark = { right: ["●", COLOURS.good], viseme: ["◐", COLOURS.fair], other: ["○", COLOURS.poor] }[quality];
-      c.fillStyle = mark[1];
-      if (row.captured) c.fillRect(x(startOf(take, k - 1) / 2 + startOf(take, k) / 2), middle - 1, x(end / 2 + start / 2) - x(startOf(take, k - 1) / 2 + startOf(take, k) / 2), 2);
-      clipped(c, mark[0], x(start), x(end), lane);
+      const middle = x((start + end) / 2);
+      if (row.captured) {
+        c.fillStyle = "#6d7c8f";
+        const before = x((startOf(take, k - 1) + start) / 2);
+        c.fillRect(before, y - 1, middle - before, 2);
+      }
+      mark(c, middle, y, Math.min(5, Math.max(2, (x(end) - x(start)) / 3)), quality);
     }
     if (pins.has(k)) {
       c.strokeStyle = COLOURS.accent;
@@ -111,6 +114,21 @@ export function drawNodes(c, lane, take) {
       c.lineWidth = 1;
     }
   });
+}
+
+function mark(c, place, y, size, quality) {
+  c.fillStyle = c.strokeStyle = { right: COLOURS.good, viseme: COLOURS.fair, other: COLOURS.poor }[quality];
+  c.lineWidth = 1.5;
+  c.beginPath();
+  c.arc(place, y, size, 0, 2 * Math.PI);
+  if (quality === "right") c.fill();
+  else c.stroke();
+  if (quality === "viseme") {
+    c.beginPath();
+    c.arc(place, y, size, Math.PI / 2, 1.5 * Math.PI);
+    c.fill();
+  }
+  c.lineWidth = 1;
 }
 
 export function drawEmotions(c, lane, take) {

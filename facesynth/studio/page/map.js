@@ -86,6 +86,7 @@ function heardMap(message) {
   marks = null;
   tools();
   redraw();
+  found();
 }
 
 async function heardPicture(message) {
@@ -324,6 +325,22 @@ export function choose(node, playIt = true) {
   list();
   redraw();
   if (node && playIt) play(node);
+}
+
+let looked = null;
+
+/** Show a node on the map of its phone, and play it. */
+export function lookAt(phone, node) {
+  phoneList.value = phone;
+  looked = node;
+  if (map?.phone === phone) return found();
+  return load(false);
+}
+
+function found() {
+  if (!looked || !map.place.has(looked)) return;
+  choose(looked);
+  looked = null;
 }
 
 const play = (node) => ask("play_node", { phone: map.phone, map: map.map, node }).catch((error) => say(error.message, true));

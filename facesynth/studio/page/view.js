@@ -13,7 +13,7 @@ export function all() {
   view.end = Math.max(duration(), SHORTEST_S);
 }
 
-const FIRST_S = 7; // of a long line so much is shown at first: its phones can be read and clicked
+const FIRST_S = 4.5; // of a long line so much is shown at first: its phones can be read and clicked
 
 export function beginning() {
   all();
