@@ -50,7 +50,7 @@ class Performing:
     """A model and a head, ready for take after take; one thread at a time."""
 
     def __init__(self, model: Method, request: Request) -> None:
-        self.model, self._request = model, request
+        self.model, self.request = model, request
         self._preview = Preview(cast_for(model, request), request)
         self._sounds: dict[Path, tuple[NDArray[np.float32], int]] = {}
         self._shown: tuple[str, str] | None = None
@@ -109,7 +109,7 @@ class Performing:
 
     def of_motion(self, motion: Motion, speech: Speech) -> Shown:
         """A recording on the head, gaps filled so that it can be looked at."""
-        request = replace(self._request, head=Part("recorded"), eyes=Part("recorded"))
+        request = replace(self.request, head=Part("recorded"), eyes=Part("recorded"))
         stage = replace(self._preview.stage, request=request)
         animation = self._preview.shown(stage.perform(for_looking(motion), speech, Cast(self.model)).animation)
         return _rows(animation, 0, len(animation))
@@ -128,7 +128,7 @@ class Performing:
             own[PINS] = {pin.phone: pin.node for pin in take.pins}
         if edits is not None and self.model.capabilities.option(NODES):
             own[NODES] = edits
-        return replace(self._request, own=own, **of_request(take))
+        return replace(self.request, own=own, **of_request(take))
 
 
 def _rows(animation: FaceAnimation, start: int, count: int) -> Shown:

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,14 +57,15 @@ def own_options(take: Take, model: Capabilities) -> dict[str, Any]:
     return {name: known[name].checked(value) for name, value in asked.items()}
 
 
-def request_of(take: Take, folder: Path, edits: Path | None, model: Capabilities) -> Request:
-    """What is asked of `speak` for the files of a take."""
+def request_of(take: Take, folder: Path, edits: Path | None, model: Capabilities, shown: Request | None = None) -> Request:
+    """What is asked of `speak` for the files of a take; shown: on which head."""
     own: dict[str, Any] = dict(own_options(take, model))
     if take.pins and model.option(PINS):
         own[PINS] = folder / CONSTRAINTS
     if edits is not None and model.option(NODES):
         own[NODES] = edits
-    return Request(phones=folder / PHONES, emotions=folder / EMOTIONS, own=own, **of_request(take))
+    said = {"phones": folder / PHONES, "emotions": folder / EMOTIONS, "own": own}
+    return replace(shown or Request(), **said, **of_request(take))
 
 
 def of_request(take: Take) -> dict[str, Any]:
@@ -74,6 +76,7 @@ def of_request(take: Take) -> dict[str, Any]:
 def arguments(model: Path, sound: Path, request: Request, take: Take, outputs: Sequence[Path]) -> list[str]:
     """The same on the command line, after `facesynth`."""
     words = ["speak", str(model), str(sound), "--phones", str(request.phones), "--emotions", str(request.emotions)]
+    words += _flags({name: value for name in ("rig", "mapping") if (value := getattr(request, name)) is not None})
     words += _flags(request.own)
     words += _flags({name: value for name, value in take.options if name in OF_REQUEST})
     return [*words, *(word for output in outputs for word in ("-o", str(output)))]

@@ -12,6 +12,7 @@ from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.methods.registry import known_capabilities, load, method_class
 from facesynth.speech.hearing import hear
 from facesynth.stage.performance import OUTPUTS
+from facesynth.stage.request import Request
 from facesynth.studio.document import first_take, take_facts
 from facesynth.studio.jobs import Job, Jobs
 from facesynth.studio.library import Signature, corpus_facts, differing, recorded, signature
@@ -144,7 +145,9 @@ class Studio:
         if not suffixes or not set(suffixes) <= set(OUTPUTS):
             raise FacesynthError(f"what can be exported is {', '.join(OUTPUTS)}; got {', '.join(suffixes) or 'nothing'}")
         said = self.project.document.line(line).take(take)
-        request = request_of(said, self.project.take_folder(line, take), self.project.edits, performing.model.capabilities)
+        request = request_of(
+            said, self.project.take_folder(line, take), self.project.edits, performing.model.capabilities, performing.request
+        )
         outputs = [folder / "exports" / f"{line}-{take}{suffix}" for suffix in suffixes]
         words = arguments(self._model_path(), self.project.sound(line), request, said, outputs)
         return self.jobs.start(f"export {line}, take {take}", words)
@@ -161,7 +164,8 @@ class Studio:
 
     async def use_model(self, path: Path) -> None:
         """Speak with another model from now on; every window begins anew with it."""
-        self.performing = await self.away(lambda: Performing.of(load(path)))
+        shown = self.performing.request if self.performing else Request()
+        self.performing = await self.away(lambda: Performing(load(path), shown))
         self.model = path
         self._seen = signature(self.corpus.path, path)
         self.project.keep_facts(model=path)

@@ -8,10 +8,11 @@ from facesynth.methods.efase.method import Efase
 from facesynth.motion.gaps import for_looking
 from facesynth.stage.cast import cast_for
 from facesynth.stage.performance import HeadStage
+from facesynth.stage.request import Request
 from facesynth.studio.commands import changed
 from facesynth.studio.document import Document, first_take, take_facts
 from facesynth.studio.performing import Performing
-from facesynth.studio.speak_files import request_of, write_take
+from facesynth.studio.speak_files import arguments, request_of, write_take
 from facesynth.studio.window import near_first
 
 HERE = {"line": "a", "take": "1"}
@@ -95,3 +96,15 @@ def test_a_recording_with_holes_can_be_looked_at(tiny):
     present = np.isfinite(frames)
     np.testing.assert_allclose(whole.frames[present], frames[present], atol=1e-4)
     np.testing.assert_allclose(whole.frames[:, 6:9], np.tile(motion.layout.neutral[6:9], (len(frames), 1)), atol=1e-4)
+
+
+def test_what_is_exported_is_on_the_head_that_is_shown(played, tmp_path):
+    """The command line names the head, as the studio was started with it."""
+    model, document, _ = played
+    take = document.line("a").takes[0]
+    shown = Request(rig=tmp_path / "my head.glb", mapping=tmp_path / "map.yaml")
+    request = request_of(take, tmp_path, None, model.capabilities, shown)
+    words = arguments(tmp_path / "m.safetensors", tmp_path / "a.wav", request, take, [tmp_path / "a.mp4"])
+    assert (request.rig, request.mapping) == (shown.rig, shown.mapping)
+    assert words[words.index("--rig") + 1] == str(shown.rig)
+    assert words[words.index("--mapping") + 1] == str(shown.mapping)

@@ -38,8 +38,10 @@ export class Face {
     const box = new THREE.Box3().setFromObject(this.body.root);
     const middle = box.getCenter(new THREE.Vector3());
     const height = box.max.y - box.min.y;
-    this.controls.target.set(middle.x, box.min.y + 0.64 * height, middle.z);
-    this.camera.position.set(middle.x, box.min.y + 0.66 * height, middle.z + 1.75 * height);
+    const bust = box.max.x - box.min.x > 0.85 * height; // with shoulders; a head alone is shown whole
+    const [up, far] = bust ? [0.64, 1.75] : [0.5, 2.6];
+    this.controls.target.set(middle.x, box.min.y + up * height, middle.z);
+    this.camera.position.set(middle.x, box.min.y + (up + 0.02) * height, middle.z + far * height);
     this.controls.update();
     this.ask();
   }
