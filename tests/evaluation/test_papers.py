@@ -7,7 +7,7 @@ from living_eyes import with_eyes
 from nodding import nodding_corpus
 
 from facesynth.config import load_config
-from facesynth.evaluation.papers import Material, deng2006_speech, reproduce
+from facesynth.evaluation.papers import Material, deng2006_speech, reproduce, saisan2004
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import DEGREES, SPEECH
@@ -18,6 +18,7 @@ from facesynth.methods.coarticulation.method import Coarticulation
 from facesynth.methods.coarticulation.transitions import PENALTIES
 from facesynth.methods.efase import tuning
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.lds.method import LDS
 
 
 @pytest.mark.parametrize(
@@ -25,6 +26,7 @@ from facesynth.methods.efase.method import Efase
     [
         ("efase_published", Efase, tuning.PUBLISHED),
         ("coarticulation_paper", Coarticulation, deng2006_speech.PUBLISHED),
+        ("lds_paper", LDS, saisan2004.SETTINGS),
     ],
 )
 def test_published_settings_are_those_of_the_files(file, method, published, repository):
