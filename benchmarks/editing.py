@@ -4,8 +4,8 @@
 
 Phones and sound are those of utterances of the corpus, joined until there are so many. Each kind of change is made at places
 spread over the sentence, each time after the sentence was there as it was before: a constraint (another node of the same
-phone), a boundary, the emotion from there on, and an intensity of one half from there on. Shown are medians and the worst, in
-seconds of the clock and, for a loaded machine, of the processor:
+phone), a node removed, a boundary, the emotion from there on, and an intensity of one half from there on. Shown are medians
+and the worst, in seconds of the clock and, for a loaded machine, of the processor:
 
     search    the new path, from what is kept
     window    frames of the second before and the second after the change
@@ -23,6 +23,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from facesynth.corpus import Corpus
+from facesynth.corpus.journal import Edits
 from facesynth.evaluation.papers.joined import joined
 from facesynth.inference.speech import EmotionTrack, PhoneTrack
 from facesynth.methods.registry import load
@@ -78,7 +79,11 @@ def _from(speech, place, before, after, amount):
     return EmotionTrack((before, after), np.array([cut_s, end_s]), np.array([1.0, amount]))
 
 
-CHANGES = {"constraint": constraint, "boundary": boundary, "emotion": emotion, "intensity": intensity}
+def removal(model, speech, choices, place):
+    return speech, {"edits": Edits(frozenset([choices[place]["node"]]), ())}
+
+
+CHANGES = {"constraint": constraint, "removal": removal, "boundary": boundary, "emotion": emotion, "intensity": intensity}
 
 
 def sentence(corpus, count):

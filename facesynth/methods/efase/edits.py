@@ -81,7 +81,7 @@ def changed_nodes(model: "Efase", edits: Edits) -> Changed:
         "emotions": np.array([model.emotions.index(one.emotion) for one in new], np.int64),
         "before": np.full(len(new), -1, np.int64),
     }
-    frames = np.concatenate([old.frames, *pieces]).astype(np.float32)
+    frames = np.concatenate([old.frames, *pieces]) if pieces else old.frames
     columns = {name: np.concatenate([getattr(left, name), added[name]]) for name in COLUMNS}
     return Changed(
         replace(left, frames=frames, **columns), kept, [*(names[k] for k in kept.tolist()), *(one.name for one in new)]
