@@ -18,10 +18,11 @@ from starlette.websockets import WebSocket
 from facesynth.corpus.files import check_id
 from facesynth.inference.errors import FacesynthError
 from facesynth.studio.guard import App, Guard, TooLargeError, as_line
-from facesynth.studio.studio import Studio
+from facesynth.studio.studio import REPORTS, Studio
 from facesynth.studio.window import SocketWindow
 
 PAGE = Path(__file__).parent / "page"
+_REPORT_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:"
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
 
 
@@ -46,6 +47,7 @@ def studio_app(studio: Studio, token: str, port: int, head: Path) -> App:
         Route("/sound/{line}", partial(_sound, studio)),
         Route("/recorded/{utterance}", partial(_recorded_sound, studio)),
         Route("/exports/{name}", partial(_export, studio)),
+        Route("/reports/{name}", partial(_report, studio)),
         Route("/upload", partial(_upload, studio), methods=["POST"]),
         WebSocketRoute("/link", partial(_link, studio)),
     ]
@@ -96,6 +98,15 @@ async def _export(studio: Studio, request: Request) -> Response:
     there = {path.name: path for path in folder.iterdir() if path.is_file() and not path.is_symlink()} if folder.is_dir() else {}
     path = there.get(request.path_params["name"])
     return FileResponse(path, filename=path.name) if path else _nothing()
+
+
+async def _report(studio: Studio, request: Request) -> Response:
+    """A report: one page that holds everything in itself, and may do nothing."""
+    name = request.path_params["name"]
+    if name not in studio.reports():
+        return _nothing()
+    page = studio.project.folder / REPORTS / name / "index.html"
+    return FileResponse(page, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})
 
 
 async def _upload(studio: Studio, request: Request) -> Response:

@@ -22,6 +22,7 @@ from facesynth.studio.performing import Performing, Shown, model_facts
 from facesynth.studio.project import NODES, Kept, Project
 from facesynth.studio.speak_files import arguments, request_of
 
+REPORTS = "reports"
 LOOK_EVERY_S = 2.0
 """Between looks at the disk."""
 Result = TypeVar("Result")
@@ -81,7 +82,7 @@ class Studio:
             "methods": mouths(),
             "jobs": [job.facts() for job in self.jobs.known],
         }
-        return {**facts, "folder": str(self.project.folder)}
+        return {**facts, "folder": str(self.project.folder), "reports": self.reports()}
 
     def require_performing(self) -> Performing:
         """The model's; FacesynthError without one."""
@@ -161,6 +162,21 @@ class Studio:
             await self.use_model(path)
 
         return self.jobs.start(f"train {method}", ["train", method, str(self.corpus.path), "-o", str(path)], use)
+
+    def evaluate(self, method: str) -> Job:
+        """Let the command line write a report: a method beside the reference rows, on sentences that none of them saw."""
+        name = method_class(method).name
+        folder = self.project.folder / REPORTS / f"{name}-{len(self.reports()) + 1}"
+
+        async def tell(_job: Job) -> None:
+            await self.tell_all({"kind": "reports", "reports": self.reports()})
+
+        return self.jobs.start(f"evaluate {name}", ["evaluate", str(self.corpus.path), name, "-o", str(folder)], tell)
+
+    def reports(self) -> list[str]:
+        """Names of the project's reports, the oldest first."""
+        pages = (self.project.folder / REPORTS).glob("*/index.html")
+        return [page.parent.name for page in sorted(pages, key=lambda page: page.stat().st_mtime)]
 
     async def use_model(self, path: Path) -> None:
         """Speak with another model from now on; every window begins anew with it."""

@@ -203,6 +203,9 @@ class SocketWindow:
     async def _op_train(self, message: dict[str, Any]) -> dict[str, Any]:
         return {"job": self._studio.train(str(message["method"])).facts()}
 
+    async def _op_evaluate(self, message: dict[str, Any]) -> dict[str, Any]:
+        return {"job": self._studio.evaluate(str(message["method"])).facts()}
+
     async def _op_text(self, message: dict[str, Any]) -> None:
         set_text(self._studio.corpus, str(message["utterance"]), str(message["text"]))
 

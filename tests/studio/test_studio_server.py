@@ -96,6 +96,9 @@ def test_a_window_needs_the_token_and_the_studios_own_page(served):
         "/exports/..%2fjournal.jsonl",
         "/exports/%00",
         "/exports/journal.jsonl",
+        "/reports/..",
+        "/reports/..%2f..",
+        "/reports/lines",
         "//etc/passwd",
         "/project.json",
     ],
@@ -104,6 +107,17 @@ def test_no_path_leads_out(served, path):
     status, text, _ = served.ask(path)
     assert status == 404
     assert "root:" not in text
+
+
+def test_a_report_is_a_page_that_may_do_nothing(served):
+    page = served.project.folder / "reports" / "ridge-1" / "index.html"
+    page.parent.mkdir(parents=True)
+    page.write_text("<title>report</title>")
+    with served.window() as window:
+        assert told(window, "all")["reports"] == ["ridge-1"]
+    status, text, headers = served.ask("/reports/ridge-1")
+    assert (status, text) == (200, "<title>report</title>")
+    assert headers["content-security-policy"].startswith("sandbox; default-src 'none'")
 
 
 def test_an_upload_of_two_gigabytes_is_refused_before_it_comes(served):

@@ -1,6 +1,6 @@
 // The page of the corpus: what is in it, what is wrong with it and where to mend it, transcripts, alignment, training.
 
-import { ask } from "/page/link.js";
+import { ask, on } from "/page/link.js";
 import { store, watch, say } from "/page/store.js";
 import { make, labelled, choice } from "/page/dom.js";
 import { jobRows } from "/page/export.js";
@@ -12,6 +12,10 @@ let methods = [];
 
 export function begin() {
   watch("corpus jobs", show);
+  on("reports", ({ reports }) => {
+    store.reports = reports;
+    show();
+  });
 }
 
 export function setMethods(names) {
@@ -31,7 +35,9 @@ function show() {
       make("button", { id: "corpus-check", textContent: "Check it", onclick: () => run("check") }),
       make("button", { id: "corpus-align", textContent: "Place phones anew", title: "Of the utterances that are ticked; phones that were corrected by hand stay", onclick: align }),
       labelled("Method", choice(methods, store.model?.method ?? methods[0], { id: "corpus-method" })),
-      make("button", { id: "corpus-train", textContent: "Train", onclick: () => run("train", { method: document.getElementById("corpus-method").value }) })),
+      make("button", { id: "corpus-train", textContent: "Train", onclick: () => run("train", { method: document.getElementById("corpus-method").value }) }),
+      make("button", { id: "corpus-evaluate", textContent: "Evaluate", title: "Beside reference rows, on sentences that none of them saw", onclick: () => run("evaluate", { method: document.getElementById("corpus-method").value }) })),
+    ...reportRows(),
     make("div", { id: "corpus-jobs" }, ...jobRows().slice(0, 4)),
     ...problemRows(),
     table(corpus));
@@ -40,6 +46,12 @@ function show() {
 }
 
 export const refresh = show;
+
+function reportRows() {
+  if (!store.reports.length) return [];
+  const links = store.reports.map((name) => make("a", { href: `/reports/${encodeURIComponent(name)}`, target: "_blank", rel: "noopener", textContent: name }));
+  return [make("p", { className: "row" }, "Reports: ", ...links)];
+}
 
 const minutes = (corpus) => (corpus.utterances.reduce((sum, row) => sum + row.duration_s, 0) / 60).toFixed(1);
 

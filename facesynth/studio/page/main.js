@@ -37,7 +37,7 @@ async function begin() {
 
 function listen() {
   on("all", (message) => {
-    Object.assign(store, { corpus: message.corpus, model: message.model, outputs: message.outputs });
+    Object.assign(store, { corpus: message.corpus, model: message.model, outputs: message.outputs, reports: message.reports });
     for (const job of message.jobs) store.jobs.set(job.number, job);
     corpus.setMethods(message.methods);
     byId("face-note").textContent = message.model ? "" : "There is no model yet: train one on the page of the corpus.";

@@ -8,6 +8,7 @@ export const store = {
   corpus: null,
   model: null,
   outputs: [],
+  reports: [],
   jobs: new Map(),
   line: null,
   take: null,
