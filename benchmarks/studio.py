@@ -4,11 +4,13 @@
 
 From a change to the moving face: what is near the playhead, and the whole sentence; pictures a second while a boundary is
 dragged; the timeline of ten minutes while it is scrolled; and how far the picture is from the sound after a minute.
-Chromium runs without a screen and draws by the processor, on the same cores as the studio.
+Chromium runs without a screen and draws by the processor, on the same cores as the studio. Times of the clock tell what else
+the machine does; times of the processor (Linux) do not: what studio and browser, drawing included, worked for a change.
 """
 
 import argparse
 import json
+import os
 import sys
 import tempfile
 import time
@@ -51,13 +53,35 @@ def prepare(folder, corpus):
     return len(sentence.phones), len(long)
 
 
+def worked_ms():
+    """Milliseconds of the processor that the studio and the browser worked so far: all descendants of this process."""
+    parents, spent = {}, {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            name, fields = path.read_text().split("(", 1)[1].rsplit(")", 1)
+        except (OSError, IndexError):
+            continue
+        numbers = fields.split()
+        parents[int(path.parent.name)] = int(numbers[1])
+        spent[int(path.parent.name)] = name, 1000 * (int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK")
+    total = {"studio": 0.0, "browser": 0.0}
+    for process, (name, milliseconds) in spent.items():
+        above = process
+        while above in parents and above != os.getpid():
+            above = parents[above]
+        if above == os.getpid() and process != above and name != "node":
+            total["browser" if "chrom" in name else "studio"] += milliseconds
+    return np.array([total["studio"], total["browser"]])
+
+
 def changed(page, do, facts):
-    """Milliseconds from a change to the face near the playhead, and to the whole of it."""
+    """Milliseconds from a change to the face near the playhead, and to the whole of it; of the processor, studio and browser."""
     page.until_settled()
+    before = worked_ms()
     page.see(f"facesynth.timed({json.dumps(do)}, {json.dumps(facts)})")
     page.until("facesynth.measured.timed !== null && facesynth.measured.timed.whole !== undefined")
     timed = page.see("facesynth.measured.timed")
-    return timed["first"], timed["whole"]
+    return (timed["first"], timed["whole"], *(worked_ms() - before))
 
 
 def changes(page, rounds):
@@ -89,15 +113,17 @@ def dragged(page, boundary_s):
     mouse, (x, y) = page.page.mouse, page.place(boundary_s, "phones")
     mouse.move(x, y)
     mouse.down()
-    begun, before = time.perf_counter(), page.see("[facesynth.face.drawn, facesynth.timeline.counted.drawn]")
+    worked, begun, before = worked_ms(), time.perf_counter(), page.see("[facesynth.face.drawn, facesynth.timeline.counted.drawn]")
     step = 0
     while (now := time.perf_counter() - begun) < DRAG_S:
         step += 1
         mouse.move(x + 6 * np.sin(7 * now), y)
     after = page.see("[facesynth.face.drawn, facesynth.timeline.counted.drawn]")
-    seconds = time.perf_counter() - begun
+    seconds, worked = time.perf_counter() - begun, worked_ms() - worked
     mouse.up()
-    return [(b - a) / seconds for a, b in zip(before, after, strict=True)], page.see("facesynth.measured.trials")
+    trials = page.see("facesynth.measured.trials")
+    faces, lines = (b - a for a, b in zip(before, after, strict=True))
+    return (faces / seconds, lines / seconds), trials, (worked[0] / max(len(trials), 1), worked[1] / max(faces, 1))
 
 
 def scrolled(page):
@@ -146,14 +172,21 @@ def main():
             page.page.select_option("#line", "sentence")
             page.until_settled()
             found, (_, boundary_s) = changes(page, asked.rounds)
-            (faces, lines), trials = dragged(page, page.take()["phones"][len(page.take()["phones"]) // 2][1] or boundary_s)
+            (faces, lines), trials, (each_trial, each_face) = dragged(
+                page, page.take()["phones"][len(page.take()["phones"]) // 2][1] or boundary_s
+            )
             took = scrolled(page)
             apart_s = drift(page, asked.play)
     print(f"sentence of {phones} phones, line of ten minutes of {long} phones\n")
-    print("| ms | median | 9 of 10 |\n|---|---|---|")
+    print("| change, ms of the processor, mean | studio | browser |\n|---|---|---|")
     for name, times in found.items():
-        print(row(f"{name} → face near the playhead", [first for first, _ in times]))
-        print(row(f"{name} → whole sentence", [whole for _, whole in times]))
+        studio, chromium = np.mean([one[2:] for one in times], axis=0)
+        print(f"| {name} | {studio:.0f} | {chromium:.0f} |")
+    print(f"| each face while dragging | {each_trial:.0f} | {each_face:.0f} |\n")
+    print("| ms of the clock | median | 9 of 10 |\n|---|---|---|")
+    for name, times in found.items():
+        print(row(f"{name} → face near the playhead", [one[0] for one in times]))
+        print(row(f"{name} → whole sentence", [one[1] for one in times]))
     print(row("boundary being dragged → face", trials))
     print(row("one picture of the timeline of ten minutes", took))
     print(f"\nwhile dragging: {faces:.0f} pictures of the face and {lines:.0f} of the timeline a second")

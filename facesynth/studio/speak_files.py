@@ -64,7 +64,7 @@ def request_of(take: Take, folder: Path, edits: Path | None, model: Capabilities
         own[PINS] = folder / CONSTRAINTS
     if edits is not None and model.option(NODES):
         own[NODES] = edits
-    said = {"phones": folder / PHONES, "emotions": folder / EMOTIONS, "own": own}
+    said: dict[str, Any] = {"phones": folder / PHONES, "emotions": folder / EMOTIONS, "own": own}
     return replace(shown or Request(), **said, **of_request(take))
 
 
