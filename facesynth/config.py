@@ -1,5 +1,6 @@
 """Method settings from YAML files and from `key=value` on the command line."""
 
+import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,26 @@ def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
             raise FacesynthError(f"{pair!r} is no setting; wanted key=value, such as components=20")
         settings[key.strip()] = yaml.safe_load(value)
     return settings
+
+
+def training_parser(about: str | None, config: Path) -> argparse.ArgumentParser:
+    """What a script that trains takes; the model is called as its file of settings is, unless -o says otherwise.
+
+    `parse_intermixed_args` lets settings stand anywhere; `settings_of` reads them.
+    """
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
+    parser.add_argument("-o", "--output", type=Path, default=Path(f"{config.stem}.safetensors"))
+    parser.add_argument("--config", type=Path, default=config)
+    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
+    parser.add_argument("--seed", type=int, default=0)
+    return parser
+
+
+def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+    """The file's settings, and before them those that were given one by one."""
+    return {**load_config(options.config), **parse_settings(options.settings)}
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -6,11 +6,10 @@ learn=true (as in configs/anime_graph_soft.yaml) learns the weights of the cost 
 the mean over paths, on sentences of CORPUS that are kept out of the graph meanwhile; those held out here play no part.
 """
 
-import argparse
 from itertools import permutations
 from pathlib import Path
 
-from facesynth.config import load_config, parse_settings
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.evaluation.geometry import lve, marker_error
 from facesynth.inference.errors import FacesynthError
@@ -19,25 +18,20 @@ from facesynth.methods.anime_graph.parallel import take_of
 from facesynth.methods.anime_graph.report import MapTrial
 from facesynth.methods.training import train
 
+CONFIG = Path(__file__).parents[1] / "configs" / "anime_graph.yaml"
+
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
-    parser.add_argument("-o", "--output", type=Path, default=Path("anime_graph.safetensors"))
-    parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "anime_graph.yaml")
+    parser = training_parser(__doc__, CONFIG)
     parser.add_argument("--maps", type=int, metavar="N", help="leave each of N parallel sentences out and map it, for every pair")
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_intermixed_args()
 
     # load
     corpus = Corpus.open(options.corpus)
     learn, held_out = corpus.split(options.seed)
-    settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = train(AnimeGraph, learn, settings, seed=options.seed, device=options.device)
+    model = train(AnimeGraph, learn, settings_of(options), seed=options.seed, device=options.device)
     if told := model.facts.get("learned"):
         print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
         print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))

@@ -1,18 +1,17 @@
 """Train the co-articulation model on a corpus, judge it on sentences left out, and save it.
 
-python train/coarticulation.py CORPUS [--config configs/coarticulation.yaml] [-o coarticulation.safetensors] [--seed 0]
+python train/coarticulation.py CORPUS [--config configs/coarticulation.yaml] [-o coarticulation.safetensors] [key=value …]
 
 With --common FILE nothing is trained: the polynomials of all pairs of phones of CORPUS together are written, by which key shapes
 made by hand are blended.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 import yaml
 
-from facesynth.config import load_config
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
@@ -24,7 +23,9 @@ CONFIG = Path(__file__).parents[1] / "configs" / "coarticulation.yaml"
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = parse(arguments)
+    parser = training_parser(__doc__, CONFIG)
+    parser.add_argument("--common", type=Path, help="YAML file to write the polynomials of all pairs to")
+    options = parser.parse_intermixed_args(arguments)
 
     # Load, and leave sentences out.
     corpus = Corpus.open(options.corpus)
@@ -35,7 +36,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit: key shapes of phones, and polynomials of the time by viseme class.
-    model = learn(Coarticulation, train, load_config(options.config), seed=options.seed, device=options.device)
+    model = learn(Coarticulation, train, settings_of(options), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate.
@@ -74,17 +75,6 @@ def mean_weights(models: WeightModels) -> str:
     powers = np.vander(t, models.diphones.shape[-1], increasing=True)
     rows = zip(("first", "second"), models.diphones.mean(axis=(0, 1)) @ powers.T, strict=True)
     return "\n".join(f"  {name:6}" + "".join(f"{weight:7.2f}" for weight in weights) for name, weights in rows)
-
-
-def parse(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("--config", type=Path, default=CONFIG)
-    parser.add_argument("-o", "--output", type=Path, default=Path("coarticulation.safetensors"))
-    parser.add_argument("--common", type=Path, help="YAML file to write the polynomials of all pairs to")
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
-    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

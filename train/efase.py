@@ -7,34 +7,28 @@ much to sharpen by gradient through the soft search, on sentences of CORPUS that
 what is printed at the end comes from sentences that played no part in any of it.
 """
 
-import argparse
 from pathlib import Path
 
-from facesynth.config import load_config, parse_settings
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, marker_error
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.training import train
 
+CONFIG = Path(__file__).parents[1] / "configs" / "efase.yaml"
+
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
-    parser.add_argument("-o", "--output", type=Path, default=Path("efase.safetensors"))
-    parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "efase.yaml")
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
+    parser = training_parser(__doc__, CONFIG)
     options = parser.parse_intermixed_args()
 
     # load
     corpus = Corpus.open(options.corpus)
     recorded, held_out = corpus.split(options.seed)
-    settings = {**load_config(options.config), **parse_settings(options.settings)}
 
     # fit
-    model = train(Efase, recorded, settings, seed=options.seed, device=options.device)
+    model = train(Efase, recorded, settings_of(options), seed=options.seed, device=options.device)
     if told := model.facts.get("learned"):
         print(f"learned in {told['rounds']} rounds, validation error {told['improvement']:.1%} less")
         print(" ".join(f"{name}={value:.4g}" for name, value in told["settings"].items()))

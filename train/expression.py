@@ -1,15 +1,14 @@
 """Learn what emotions add to a neutral face, judge it on sentences left out, and save it.
 
-python train/expression.py CORPUS [--config configs/expression.yaml] [-o expression.safetensors] [--seed 0]
+python train/expression.py CORPUS [--config configs/expression.yaml] [-o expression.safetensors] [--seed 0] [key=value …]
 """
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from facesynth.config import load_config
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.evaluation.geometry import marker_error
 from facesynth.inference.motion import Motion
@@ -22,7 +21,8 @@ CONFIG = Path(__file__).parents[1] / "configs" / "expression.yaml"
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = parse(arguments)
+    parser = training_parser(__doc__, CONFIG)
+    options = parser.parse_intermixed_args(arguments)
 
     # Load, and leave sentences out.
     corpus = Corpus.open(options.corpus)
@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit: differences of twins, their eigenspace, the signals in it.
-    model = learn(Expression, train, load_config(options.config), seed=options.seed, device=options.device)
+    model = learn(Expression, train, settings_of(options), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate: a recorded neutral sentence with the emotion added, against the recorded emotional one at the same timing.
@@ -59,16 +59,6 @@ def report(model: Expression) -> None:
     if unlike := facts["other_phones"]:
         print(f"left out: {unlike} pairs whose phones are not the same")
     print(f"the eigenspace holds {facts['variance']:.1%} of the variance in {model.basis.shape[1]} dimensions")
-
-
-def parse(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("--config", type=Path, default=CONFIG)
-    parser.add_argument("-o", "--output", type=Path, default=Path("expression.safetensors"))
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
-    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

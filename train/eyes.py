@@ -5,13 +5,12 @@ python train/eyes.py CORPUS [--lids CORPUS] [-o eyes.safetensors] [--config conf
 --lids names a corpus that lends its lids, where the eyes of CORPUS were recorded without.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.config import load_config, parse_settings
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.corpus.eyes import recorded_eyes
 from facesynth.device import device_of
@@ -21,6 +20,7 @@ from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.recordings import whole_pieces
 from facesynth.motion.lids import eyes_of, opening_of
 
+CONFIG = Path(__file__).parents[1] / "configs" / "eyes.yaml"
 LEAST_S = 1.0
 """Of a recording that is compared with."""
 
@@ -31,20 +31,14 @@ def measured(opening: Floats, eyes: NDArray[np.floating], fps: float) -> Samples
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("settings", nargs="*", metavar="KEY=VALUE")
+    parser = training_parser(__doc__, CONFIG)
     parser.add_argument("--lids", type=Path)
-    parser.add_argument("-o", "--output", type=Path, default=Path("eyes.safetensors"))
-    parser.add_argument("--config", type=Path, default=Path(__file__).parents[1] / "configs" / "eyes.yaml")
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_intermixed_args()
 
     # load
     recorded, held_out = Corpus.open(options.corpus).split(options.seed)
     lids = Corpus.open(options.lids) if options.lids else None
-    settings = {**load_config(options.config), **parse_settings(options.settings)}
+    settings = settings_of(options)
 
     # fit
     place = device_of(options.device or settings.get("device", "cpu"))

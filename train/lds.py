@@ -1,15 +1,14 @@
 """Train the linear dynamical system on a corpus, judge it on sentences left out, and save it.
 
-python train/lds.py CORPUS [--config configs/lds.yaml] [-o lds.safetensors] [--seed 0] [--plots folder/]
+python train/lds.py CORPUS [--config configs/lds.yaml] [-o lds.safetensors] [--seed 0] [key=value …] [--plots folder/]
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.config import load_config
+from facesynth.config import settings_of, training_parser
 from facesynth.corpus import Corpus
 from facesynth.inference.speech import Speech
 from facesynth.methods.lds.method import LDS
@@ -21,7 +20,9 @@ CONFIG = Path(__file__).parents[1] / "configs" / "lds.yaml"
 
 
 def main(arguments: list[str] | None = None) -> None:
-    options = parse(arguments)
+    parser = training_parser(__doc__, CONFIG)
+    parser.add_argument("--plots", type=Path, help="folder for plots of what was identified")
+    options = parser.parse_intermixed_args(arguments)
 
     # Load, and leave sentences out.
     corpus = Corpus.open(options.corpus)
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{corpus.performer} ({corpus.layout.kind}): {len(train)} utterances to learn from, {len(test)} to judge by")
 
     # Fit. The order and the lead are chosen on the training sentences alone.
-    model = learn(LDS, train, load_config(options.config), seed=options.seed, device=options.device)
+    model = learn(LDS, train, settings_of(options), seed=options.seed, device=options.device)
     report(model)
 
     # Evaluate: the deterministic part, samples with noise, and the mean pose of the training sentences.
@@ -71,17 +72,6 @@ def report(model: LDS) -> None:
         print(f"unstable eigenvalues moved inside and refitted: {', '.join(f'{modulus:.3f}' for modulus in facts['repaired'])}")
     print(f"squared error one step ahead of predicting no change: {facts['no_change_error']:.4g}")
     print(f"excess kurtosis of the innovations: {', '.join(f'{k:.1f}' for k in facts['kurtosis'])}")
-
-
-def parse(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("--config", type=Path, default=CONFIG)
-    parser.add_argument("-o", "--output", type=Path, default=Path("lds.safetensors"))
-    parser.add_argument("--plots", type=Path, help="folder for plots of what was identified")
-    parser.add_argument("--device", help="auto, cpu, cuda or mps; as the settings say otherwise")
-    parser.add_argument("--seed", type=int, default=0)
-    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

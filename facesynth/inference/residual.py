@@ -123,4 +123,4 @@ def exported_residual(folder: Folder, arrays: Mapping[str, NDArray[Any]]) -> Res
     """Of a folder, whose settings state the share; None where that is 0."""
     share = float(folder.settings["residual"])
     kept = (arrays[f"residual_{name}"] for name in ARRAYS) if share > 0 else ()
-    return ResidualMotion(*kept, float(folder.manifest["fps"]), share) if share > 0 else None
+    return ResidualMotion(*kept, fps=float(folder.manifest["fps"]), share=share) if share > 0 else None

@@ -57,7 +57,7 @@ class Residual(nn.Module):
     def motion(self, fps: float, share: float) -> ResidualMotion | None:
         """What speaks with it; None where nothing was kept."""
         arrays = (getattr(self, name).cpu().numpy() for name in ARRAYS)
-        return ResidualMotion(*arrays, fps, share) if self.any else None
+        return ResidualMotion(*arrays, fps=fps, share=share) if self.any else None
 
     @property
     def any(self) -> bool:
