@@ -1,5 +1,7 @@
 """Text of files whose encoding nobody states."""
 
+from pathlib import Path
+
 _LOWER = frozenset("àáâãäåæçèéêëìíîïñòóôõöøùúûüýÿßœ")
 _UPPER = frozenset("ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜŸŒ")
 
@@ -18,6 +20,21 @@ def decoded(content: bytes) -> tuple[str, str]:
     except UnicodeDecodeError:
         latin, mac = content.decode("cp1252", errors="replace"), content.decode("mac_roman")
         return (mac, "MacRoman") if _likely_letters(mac) > _likely_letters(latin) else (latin, "Latin-1")
+
+
+def text_of(path: Path, most: int | None = None) -> str:
+    """The text of a file, or of its first `most` bytes, in any encoding; OSError and UnicodeDecodeError where there is none."""
+    with open(path, "rb") as file:
+        content = file.read() if most is None else file.read(most)
+    if most is not None and len(content) == most:
+        content = content[: content.rfind(b"\n") + 1] or content  # a letter may be cut at the end
+    return decoded(content)[0]
+
+
+def encoding_remark(path: Path) -> tuple[str, ...]:
+    """What is said of a text whose encoding had to be guessed."""
+    guessed = decoded(path.read_bytes())[1]
+    return (f"{path.name} is not UTF-8; it was read as {guessed}",) if guessed else ()
 
 
 def _likely_letters(text: str) -> int:

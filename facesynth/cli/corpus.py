@@ -336,12 +336,13 @@ def _counted(counts: Mapping[str, int]) -> str:
 
 
 def _read_text(path: Path) -> str:
+    from facesynth.encoding import text_of
     from facesynth.inference.errors import FacesynthError
 
     try:
-        return " ".join(path.read_text(encoding="utf-8-sig").split())
+        return " ".join(text_of(path).split())
     except (OSError, UnicodeDecodeError) as error:
-        raise FacesynthError(f"{path} cannot be read as text in UTF-8 ({error})") from None
+        raise FacesynthError(f"{path} cannot be read as text ({error})") from None
 
 
 def _show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:

@@ -1,6 +1,7 @@
 """Tables of numbers as text: commas, semicolons or tabs, decimal points or commas, with or without names of columns."""
 
 import csv
+import io
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,9 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError
 
 _COMMA_NUMBER = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
+HEAD_BYTES = 1 << 20
+"""Hold the rows that names are looked for in."""
 _LONGEST_QUOTE = 60
 _LOOKED_AT = 50
 """Rows that show how numbers are written."""
@@ -49,8 +53,8 @@ def is_number(text: str, decimal: str = ".") -> bool:
 
 def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]]:
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            sign = separator or _separator(file.readline())
+        with io.StringIO(text_of(path, HEAD_BYTES if most is not None else None), newline="") as file:
+            sign = separator or separator_of(file.readline())
             file.seek(0)
             reader = csv.reader(file, delimiter=sign, skipinitialspace=sign == " ")
             rows: list[list[str]] = []
@@ -60,10 +64,10 @@ def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]
                     break
             return rows
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error}); export it again") from None
+        raise FacesynthError(f"{path} cannot be read as CSV ({error}); export it again") from None
 
 
-def _separator(line: str) -> str:
+def separator_of(line: str) -> str:
     """The sign that occurs most; a comma may also be a decimal one, so it comes after semicolon and tab."""
     line = line.lstrip("\ufeff")
     return next((sign for sign in (";", "\t") if sign in line), ",")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from facesynth.encoding import encoding_remark, text_of
 from facesynth.inference.emotion_track import track_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import EmotionTrack, Speech
@@ -40,7 +41,7 @@ def listen(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
 def read_text(path: Path) -> str:
     """A transcript; FacesynthError where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return text_of(path)
     except (OSError, UnicodeDecodeError) as error:
         raise FacesynthError(f"{path}: cannot read the transcript ({error})") from None
 
@@ -64,6 +65,8 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         grid, words = recording.with_suffix(".TextGrid"), recording.with_suffix(".txt")
         phones = grid if grid.exists() else None
         text = read_text(words) if phones is None and words.exists() else None
+        for remark in encoding_remark(words) if text is not None else ():
+            tell(f"warning: {remark}")
     if cast.detector is not None:
         heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker, language=request.language)
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from bringing import added, corpus_of, lay_down, run
 
+from facesynth.corpus.add.transcripts import is_table, read_transcripts
 from facesynth.inference.phones import PHONES
 from facesynth.speech.pronunciation import pronunciations
 from facesynth.speech.transcript import left_out, words_of
@@ -51,3 +52,28 @@ def test_directions_are_told_where_words_are_placed(tmp_path, talker, voiced):
     code, printed, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--text", text, "--json")
     assert code == 0, said
     assert any("[music], (laughs)" in line for line in json.loads(printed)["remarks"])
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-16-le", "utf-8-sig", "mac_roman"])
+def test_transcripts_of_any_encoding(tmp_path, talker, voiced, encoding):
+    """As files beside the sound and as the tables that spreadsheets write."""
+    text = voiced.text.replace("boat", "bóat")
+    folder = tmp_path / "session"
+    sound = lay_down(folder, "a", voiced.duration_s)
+    sound.write_bytes(voiced.path.read_bytes())
+    sound.with_suffix(".txt").write_bytes(text.encode(encoding))
+    code, printed, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--json")
+    assert code == 0, said
+    guessed = encoding in ("latin-1", "utf-16-le", "mac_roman")
+    assert any("a.txt is not UTF-8; it was read as" in line for line in json.loads(printed)["remarks"]) == guessed
+    report, account = added(corpus_of(tmp_path), folder)
+    assert report["added"] == ["a"], report
+    assert ("a.txt is not UTF-8" in account) == guessed
+
+
+@pytest.mark.parametrize(("encoding", "sign"), [("utf-16", "\t"), ("latin-1", ";"), ("utf-8", ",")])
+def test_tables_of_transcripts_as_spreadsheets_write_them(tmp_path, encoding, sign):
+    table = tmp_path / "lines.csv"
+    table.write_bytes(f"id{sign}text\r\na.wav{sign}café, two\r\n".replace(", two", " two").encode(encoding))
+    assert is_table(table)
+    assert read_transcripts(table) == {"a": "café two"}

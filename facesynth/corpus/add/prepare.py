@@ -18,6 +18,7 @@ from facesynth.corpus.importers.unpack import read_into, unpacked, with_unpacked
 from facesynth.corpus.limits import LARGEST_DIFFERENCE_S, LARGEST_MISSING_SHARE
 from facesynth.corpus.record import Record
 from facesynth.corpus.signals import PARTS, Part, hash_file, hash_signals, lost_parts, read_speech
+from facesynth.encoding import encoding_remark
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech
@@ -218,7 +219,7 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
     """The phones of what the corpus will hold, so that aligning it later gives the same."""
     from facesynth.speech.hearing import hear_sound
 
-    return hear_sound(
+    heard = hear_sound(
         take.stored,
         take.sample_rate,
         text=record.text or None,
@@ -226,6 +227,8 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
         phones_path=recording.phones,
         speaker=recording.speaker,
     )
+    guessed = encoding_remark(recording.text) if recording.text is not None and record.text else ()
+    return replace(heard, warnings=(*guessed, *heard.warnings))
 
 
 def _is_aligned(heard: Heard | None) -> bool:

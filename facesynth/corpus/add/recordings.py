@@ -7,6 +7,7 @@ from pathlib import Path
 
 from facesynth.corpus.add.transcripts import is_table
 from facesynth.corpus.importers.formats import FORMATS
+from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.textgrid import is_silence_mark
 
@@ -154,9 +155,9 @@ def _fault(group: Mapping[str, list[Path]]) -> str:
 def words_of(path: Path) -> str:
     """What is said, from a file beside a recording: plain words, or lines of `start end word`."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = text_of(path)
     except UnicodeDecodeError:
-        raise FacesynthError(f"{path} is not text in UTF-8; save it again") from None
+        raise FacesynthError(f"{path} is no text in an encoding that is known; save it as UTF-8") from None
     if path.suffix.lower() in WORDS:
         text = " ".join(_timed_word(path, line) for line in text.splitlines() if line.strip())
     return " ".join(text.split())

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.corpus.record import COLUMNS, read_listed
+from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError
+from facesynth.motion.cells import separator_of
 
 _NAMES = ("id", "file", "name")
 
@@ -44,8 +46,7 @@ def is_table(path: Path) -> bool:
     if path.suffix.lower() != ".csv":
         return False
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            header = _header(next(csv.reader([file.readline(LONGEST_LINE)]), []))
+        header = _columns(path)
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
     return ("text" in header and any(name in header for name in _NAMES)) or ("id" in header and set(header) <= set(COLUMNS))
@@ -78,9 +79,9 @@ def read_transcripts(path: str | Path) -> dict[str, str]:
     """Texts by recording from a CSV with the columns `id` (or `file`) and `text`; a file's suffix is left out."""
     path = Path(path)
     try:
-        rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline=""), strict=True))
+        rows = _cells(text_of(path))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FacesynthError(f"{path} cannot be read as CSV in UTF-8 ({error})") from None
+        raise FacesynthError(f"{path} cannot be read as CSV ({error})") from None
     header = _header(rows[0]) if rows else []
     name = next((column for column in _NAMES if column in header), None)
     if name is None or "text" not in header:
@@ -99,8 +100,13 @@ def _header(cells: Iterable[str]) -> list[str]:
 
 
 def _columns(path: Path) -> list[str]:
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        return _header(next(csv.reader(file), []))
+    return _header(next(iter(_cells(text_of(path, LONGEST_LINE).partition("\n")[0])), []))
+
+
+def _cells(text: str) -> list[list[str]]:
+    """Rows of a table with commas, or with the semicolons or tabs that spreadsheets write."""
+    sign = separator_of(text.partition("\n")[0])
+    return list(csv.reader(io.StringIO(text, newline=""), delimiter=sign, strict=True))
 
 
 def _without_suffix(file: str) -> str:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
 from facesynth.corpus.importers.timed import at_steady_rate
+from facesynth.encoding import text_of
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Kind, Layout
@@ -15,6 +16,8 @@ from facesynth.motion.cells import read_cells
 
 FIRST = ("frame", "timestamp", "success")
 POINTS = 68
+LONGEST_HEADER = 1 << 15
+"""Bytes of its 714 names of columns are fewer."""
 GROUPS = {
     "jaw": (6, 7, 8, 9, 10),
     "brows": tuple(range(17, 27)),
@@ -37,8 +40,8 @@ FULL_BLINK = 5.0
 def is_openface(path: Path) -> bool:
     """Whether a table has OpenFace's columns."""
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            names = {name.strip() for name in next(csv.reader([file.readline()]), [])}
+        first = text_of(path, LONGEST_HEADER).partition("\n")[0]
+        names = {name.strip() for name in next(csv.reader([first]), [])}
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
     return set(FIRST) <= names and ("X_0" in names or "x_0" in names)
