@@ -145,6 +145,19 @@ def test_a_constraint_far_from_all_that_is_near_is_found_exactly_in_little_memor
         assert most < 80e6
 
 
+def test_where_penalties_are_small_beside_joints_nothing_is_lost():
+    rng = np.random.default_rng(9)
+    nodes, weights = random_nodes(rng, 700, phones=30, emotions=3, width=4, scale=3.0), Weights(40.0)
+    index, every = SearchIndex(nodes, weights, step_bounds(nodes, weights)), np.arange(700)
+    steps_of_all = steps.step_matrix(nodes, every, every, weights)
+    targets = all_targets(nodes, random_query(rng, nodes, 45, phones=30, emotions=3), weights)
+    path, phi = index.cheapest_path(targets), targets[0]
+    for target in targets[1:]:
+        phi = (phi[:, None] + steps_of_all).min(axis=0) + target
+    found = targets[np.arange(45), path].sum() + steps.step_costs(nodes, path[:-1], path[1:], weights).sum()
+    np.testing.assert_allclose(found, phi.min(), rtol=1e-9)
+
+
 @pytest.mark.parametrize("shortest", [1, 3])
 def test_costs_of_pairs_and_targets_are_the_literal_ones(shortest):
     rng = np.random.default_rng(6)

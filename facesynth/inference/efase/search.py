@@ -223,9 +223,8 @@ class Search:
             limit = min(limit, _limit(self._rejoined()))
         kept = self._backwards(limit)
         if sum(len(some.nodes) for some in kept) > MANY * len(kept):
-            first = 0 if len(kept[0].nodes) else 1  # nothing before what is known already
-            start = kept[first].nodes[self.positions[first - len(kept)].back[kept[first].nodes] != UNKNOWN]
-            limit = min(limit, _limit(self._led(kept[first + 1 :], start, self.positions[first - len(kept)].phi[start])))
+            start = kept[0].nodes  # known, or none where all that counts is known later
+            limit = min(limit, _limit(self._led(kept[1:], start, self.positions[-len(kept)].phi[start])))
             kept = self._backwards(limit)
         for t in range(len(self) - len(kept) + 1, len(self)):
             self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
@@ -267,16 +266,16 @@ class Search:
 
         kept: of the last phones; i and phi [n]: nodes, and what paths to them cost, of the phone before those.
         """
-        if not kept:
-            return phi
-        for position, some in zip(self.positions[-len(kept) :], kept, strict=True):
+        for position, some in zip(self.positions[len(self) - len(kept) :], kept, strict=True):
             whole = position.phi[some.nodes] + some.rest
             j = some.nodes[np.argsort(whole, kind="stable")[: 2 * BEAM]]
             j = np.union1d(j, np.intersect1d(self.bounds.following(i), some.nodes))
-            phi = np.where(position.back[j] == UNKNOWN, self._reached(i, phi, j) + position.targets[j], position.phi[j])
+            reached = self._reached(i, phi, j) + position.targets[j] if len(i) else np.full(len(j), np.inf)
+            phi = np.where(position.back[j] == UNKNOWN, reached, position.phi[j])
             best = np.argsort(phi, kind="stable")[: 2 * BEAM]
+            best = best[phi[best] < np.inf]
             i, phi = j[best], phi[best]
-        return phi
+        return phi if len(phi) else np.full(1, np.inf)
 
     def _backwards(self, limit: float) -> list[Kept]:
         """Nodes of the last positions, in the order of time, until all of them are known."""
