@@ -1,6 +1,16 @@
-// A head in three dimensions, moved by weights on the graphics card.
+// A head in three dimensions. Its shapes are sparse: adding those that are active up here costs less than handing the graphics
+// card 52 of them for every vertex, and does not depend on what that card is.
 
 import { THREE, OrbitControls, GLTFLoader } from "/three.js";
+
+/** Without a graphics card every pixel costs: fewer are drawn, with simpler light. */
+const DRAWN_BY_PROCESSOR = (() => {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const facts = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = facts ? context.getParameter(facts.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+})();
 
 let file = null; // the head is fetched once and read once for each window
 
@@ -8,8 +18,8 @@ let file = null; // the head is fetched once and read once for each window
 export class Face {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !DRAWN_BY_PROCESSOR });
+    this.renderer.setPixelRatio(DRAWN_BY_PROCESSOR ? 0.8 : Math.min(devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0x20262e);
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 20);
@@ -120,25 +130,28 @@ class Body {
   constructor(root, animation) {
     this.root = root;
     this.meshes = [];
+    const surfaces = new Map(); // what several meshes share is moved once
     root.traverse((node) => {
       if (node.isMesh) node.frustumCulled = false;
-      if (node.isMesh && node.morphTargetDictionary) this.meshes.push(node);
+      if (!node.isMesh || !node.morphTargetDictionary) return;
+      const { position } = node.geometry.attributes;
+      if (!surfaces.has(position)) surfaces.set(position, new Surface(node));
+      this.meshes.push({ node, surface: surfaces.get(position) });
     });
+    for (const { node, surface } of this.meshes) surface.take(node);
+    this.surfaces = [...surfaces.values()];
+    if (DRAWN_BY_PROCESSOR) root.traverse((node) => node.isMesh && (node.material = simpler(node.material)));
     root.updateMatrixWorld(true);
     const moved = (path) => (animation?.tracks ?? []).filter((t) => t.name.endsWith(path)).map((t) => t.name.slice(0, -path.length));
     const shifted = new Set(moved(".position"));
     const turned = moved(".quaternion");
     this.heads = turned.filter((name) => shifted.has(name)).map((name) => joint(root, name));
     this.eyes = turned.filter((name) => !shifted.has(name)).map((name) => joint(root, name));
-    this.order = new Map();
   }
 
   /** Row: weights in the order of `names`, head (3 rad, 3 mm), gaze (2 rad), lift of the tongue. */
   pose(row, names) {
-    for (const mesh of this.meshes) {
-      const places = this.placesOf(mesh, names);
-      for (let k = 0; k < places.length; k++) if (places[k] >= 0) mesh.morphTargetInfluences[places[k]] = row[k];
-    }
+    for (const surface of this.surfaces) surface.move(row, names);
     const at = names.length;
     const angle = Math.hypot(row[at], row[at + 1], row[at + 2]);
     const axis = new THREE.Vector3(row[at], row[at + 1], row[at + 2]).divideScalar(angle || 1);
@@ -149,15 +162,6 @@ class Body {
     for (const eye of this.eyes) place(eye, look, null);
   }
 
-  placesOf(mesh, names) {
-    let places = this.order.get(mesh);
-    if (!places) {
-      places = names.map((name) => mesh.morphTargetDictionary[name] ?? -1);
-      this.order.set(mesh, places);
-    }
-    return places;
-  }
-
   paint(material) {
     this.root.traverse((node) => {
       if (node.isMesh) node.material = material;
@@ -166,44 +170,101 @@ class Body {
 
   /** Blue where both are the same, red where the skin is 4 mm apart. */
   heat(row, other) {
-    for (const mesh of this.meshes) {
-      const { geometry } = mesh;
-      mesh.userData.plain ??= mesh.material;
-      if (!row || !other) {
-        mesh.material = mesh.userData.plain;
-        continue;
-      }
-      mesh.userData.heat ??= heatMaterial(geometry);
-      mesh.material = mesh.userData.heat;
-      colour(geometry, this.order.get(mesh) ?? [], row, other);
+    for (const { node, surface } of this.meshes) {
+      node.userData.plain ??= node.material;
+      node.userData.heat ??= row && other ? heatMaterial(node.geometry, surface) : null;
+      node.material = row && other ? node.userData.heat : node.userData.plain;
     }
+    if (row && other) for (const surface of this.surfaces) surface.colour(row, other);
   }
 }
 
-function heatMaterial(geometry) {
-  geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(geometry.attributes.position.count * 3), 3));
-  return new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.7 });
+/** Vertices that shapes move: where they rest, and for each shape which of them it moves, and how far. */
+class Surface {
+  constructor(mesh) {
+    const { position, normal } = mesh.geometry.attributes;
+    this.position = plain(position);
+    this.normal = normal ? plain(normal) : null;
+    this.rest = this.position.array.slice();
+    this.upright = this.normal?.array.slice();
+    this.index = new Map(Object.entries(mesh.morphTargetDictionary));
+    const { position: places, normal: turns } = mesh.geometry.morphAttributes;
+    this.shapes = places.map(sparse);
+    this.turns = this.normal && turns ? turns.map(sparse) : [];
+  }
+
+  /** Let a mesh be drawn from here. */
+  take(mesh) {
+    mesh.geometry.setAttribute("position", this.position);
+    if (this.normal) mesh.geometry.setAttribute("normal", this.normal);
+    mesh.geometry.morphAttributes = {};
+    mesh.morphTargetInfluences = mesh.morphTargetDictionary = undefined;
+  }
+
+  order(names) {
+    if (this.names !== names.join()) {
+      this.names = names.join();
+      this.places = names.map((name) => this.index.get(name) ?? -1);
+    }
+    return this.places;
+  }
+
+  move(row, names) {
+    this.position.array.set(this.rest);
+    if (this.normal) this.normal.array.set(this.upright);
+    this.order(names).forEach((place, k) => {
+      if (place < 0 || Math.abs(row[k]) < 1e-4) return;
+      add(this.position.array, this.shapes[place], row[k]);
+      if (this.turns.length) add(this.normal.array, this.turns[place], row[k]);
+    });
+    this.position.needsUpdate = true;
+    if (this.normal) this.normal.needsUpdate = true;
+  }
+
+  colour(row, other) {
+    const apart = new Float32Array(this.rest.length);
+    (this.places ?? []).forEach((place, k) => place >= 0 && row[k] !== other[k] && add(apart, this.shapes[place], row[k] - other[k]));
+    this.colours ??= new THREE.BufferAttribute(new Float32Array(this.rest.length), 3);
+    const { array } = this.colours;
+    for (let i = 0; i < apart.length; i += 3) {
+      const share = Math.min((1000 * Math.hypot(apart[i], apart[i + 1], apart[i + 2])) / FAR_MM, 1);
+      array[i] = 0.2 + 0.8 * share;
+      array[i + 1] = 0.35 + 0.3 * (1 - Math.abs(2 * share - 1));
+      array[i + 2] = 0.85 * (1 - share) + 0.05;
+    }
+    this.colours.needsUpdate = true;
+  }
+}
+
+function simpler({ map, color, transparent, opacity, side }) {
+  return new THREE.MeshLambertMaterial({ map, color, transparent, opacity, side });
+}
+
+/** An attribute of its own, [V, 3] in a plain array. */
+function plain(attribute) {
+  const array = new Float32Array(3 * attribute.count);
+  for (let i = 0; i < attribute.count; i++) array.set([attribute.getX(i), attribute.getY(i), attribute.getZ(i)], 3 * i);
+  return new THREE.BufferAttribute(array, 3).setUsage(THREE.DynamicDrawUsage);
+}
+
+/** Which numbers of a shape are not 0, and they. */
+function sparse(attribute) {
+  const { array } = plain(attribute);
+  const which = [];
+  for (let i = 0; i < array.length; i++) if (Math.abs(array[i]) > 1e-7) which.push(i);
+  return { which: Uint32Array.from(which), values: Float32Array.from(which, (i) => array[i]) };
+}
+
+function add(array, { which, values }, weight) {
+  for (let n = 0; n < which.length; n++) array[which[n]] += weight * values[n];
 }
 
 const FAR_MM = 4;
 
-function colour(geometry, places, row, other) {
-  const shapes = geometry.morphAttributes.position;
-  const apart = new Float32Array(geometry.attributes.position.count * 3);
-  places.forEach((target, k) => {
-    const difference = row[k] - other[k];
-    if (target < 0 || Math.abs(difference) < 1e-4) return;
-    const shape = shapes[target].array;
-    for (let i = 0; i < apart.length; i++) apart[i] += difference * shape[i];
-  });
-  const colours = geometry.attributes.color.array;
-  for (let i = 0; i < apart.length; i += 3) {
-    const share = Math.min((1000 * Math.hypot(apart[i], apart[i + 1], apart[i + 2])) / FAR_MM, 1);
-    colours[i] = 0.2 + 0.8 * share;
-    colours[i + 1] = 0.35 + 0.3 * (1 - Math.abs(2 * share - 1));
-    colours[i + 2] = 0.85 * (1 - share) + 0.05;
-  }
-  geometry.attributes.color.needsUpdate = true;
+function heatMaterial(geometry, surface) {
+  surface.colours ??= new THREE.BufferAttribute(new Float32Array(surface.rest.length), 3);
+  geometry.setAttribute("color", surface.colours);
+  return new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.7 });
 }
 
 /** A node with its pose at rest, and how the axes of the world lie in its parent. */
