@@ -4,11 +4,12 @@ python benchmarks/eyes.py DATA CORPUS [--write eyes.safetensors] [--picture head
 
 DATA holds the folders gaze_conversation (fixations of people in conversation) and head_conversation (heads and eyes of two
 people); CORPUS shows the lids of a talker, such as GRID s1 from video. --write keeps the model that comes with the package:
-gaze of head_conversation with lids that are grown from CORPUS. --picture draws it beside recorded eyes.
+gaze of gaze_conversation with lids that are grown from CORPUS. --picture draws it beside recorded eyes.
 """
 
 import argparse
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,21 +29,30 @@ from facesynth.face.behaviour.eyes import quiet_eyes
 from facesynth.inference.eyes import at_rest
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
+from facesynth.inference.shift_patches import LISTENING, SPEAKING
+from facesynth.inference.speech import PhoneTrack
 from facesynth.methods.eyes.method import Eyes
 from facesynth.motion.lids import opening_of, shut_level
 
 LAYOUT = Layout("curves", ("jawOpen",))
-PX_PER_DEG = 40.0
-"""Of gaze_conversation, whose scale is not stated: a usual screen at arm's length."""
+PX_PER_DEG = 60.0
+"""Of gaze_conversation, whose scale is not stated: a laptop's 1920 px on 31 cm, seen from 55 cm."""
 FIXATION_HZ, FIXATION_FPS, LONGEST_GAP_S = 90.0, 30.0, 0.5
+SHIFT_S = 0.06
+"""A gaze takes no longer from place to place, however long the tracker saw none."""
 HEAD_FPS, AVERAGED = 60.0, 7
 """Of head_conversation; its spectrum is zero at multiples of 60/7 Hz: it was averaged over 7 frames."""
-UNDONE = 5
-"""So much of it is undone for the package's model: with all, short looks aside are lost."""
+COMPENSATION = 0.6
+"""Share of the head's quick turns that the package's eyes undo; no recording here shows any."""
+MOST_S = 120.0
+"""Of each person in each role the package's model learns from no more, so that nobody outweighs the others."""
 GROWN_S = 120.0
 FEWEST = 20
 """Fixations of a person who is compared with."""
 ROLES = {"speaking": "speak", "listening": "listen"}
+NUMBERS = {"speaking": SPEAKING, "listening": LISTENING}
+People = dict[str, list[list[Motion]]]
+"""Pieces of each person by role."""
 
 
 def main() -> None:
@@ -55,15 +65,18 @@ def main() -> None:
     corpus = Corpus.open(options.corpus)
     lids = [motion for motion, _ in recorded_eyes(corpus)]
     people = heads_and_eyes(options.data / "head_conversation")
-    packaged = model_for_all(people, lids, corpus)
+    paths = sorted((options.data / "gaze_conversation").glob("*.csv"))
+    seen = {role: [scanpaths(path, said) for path in paths] for role, said in ROLES.items()}
+    packaged = as_packaged(seen, lids=lids)
+    packaged.provenance = PROVENANCE
     if options.write:
         packaged.save(options.write)
         print(packaged.facts, options.write.stat().st_size, "bytes")
     if options.picture:
         draw(people[0], lids, packaged, options.picture)
-    for role, said in ROLES.items():
-        table(f"gaze_conversation, {role}, one of 12 people left out", fixation_rows(options.data, said, packaged))
-    table("head_conversation, one of 2 people left out", gaze_rows(people))
+    for role in ROLES:
+        table(f"gaze_conversation, {role}, one of 12 people left out", fixation_rows(seen, role, people))
+    table("head_conversation, one of 2 people left out", gaze_rows(people, packaged, seen))
     table("blinks of the corpus, half of the recordings left out", blink_rows(lids))
 
 
@@ -93,7 +106,7 @@ def signed(arrays) -> np.ndarray:
 
 
 def scanpaths(path: Path, role: str) -> list[Motion]:
-    """Fixations of a role as gaze: places that rest, straight ways between; a pause begins a new piece."""
+    """Fixations of a role as gaze: places that rest until a shift, a straight way, begins; a long pause begins a new piece."""
     rows = [row for row in csv.DictReader(path.open()) if row["role"] == role]
     start = np.array([float(row["Start"]) for row in rows]) / FIXATION_HZ
     stop = start + np.array([float(row["Length"]) - 1 for row in rows]) / FIXATION_HZ
@@ -105,34 +118,62 @@ def scanpaths(path: Path, role: str) -> list[Motion]:
         times = np.arange(start[first], stop[last - 1], 1 / FIXATION_FPS)
         if len(times) < FIXATION_FPS:
             continue
-        knots, ways = np.column_stack([start, stop])[first:last].ravel(), np.repeat(place[first:last], 2, axis=0)
+        leaves = np.append(np.maximum(stop[first : last - 1], start[first + 1 : last] - SHIFT_S), stop[last - 1])
+        knots, ways = np.column_stack([start[first:last], leaves]).ravel(), np.repeat(place[first:last], 2, axis=0)
         gaze = np.stack([np.interp(times, knots, column) for column in ways.T], axis=1)
         eyes = np.column_stack([np.ones(len(times)), gaze])
         pieces.append(Motion(np.zeros((len(times), 1)), FIXATION_FPS, LAYOUT, None, eyes))
     return pieces
 
 
-def learnt(motions: list[Motion], lids: list[Motion] | None = None, **config) -> Eyes:
+def in_one(pieces: list[Motion]) -> Motion:
+    """The pieces of a person in one recording, with a gap after each."""
+    eyes = np.concatenate([np.append(piece.eyes, np.full((1, 3), np.nan), axis=0) for piece in pieces])
+    return Motion(np.zeros((len(eyes), 1)), pieces[0].fps, LAYOUT, None, eyes)
+
+
+def learnt(motions: list[Motion], lids: list[Motion] | None = None, roles: list[int] | None = None, **config) -> Eyes:
     model = Eyes(**config)
     model.layout, model.emotions = LAYOUT, ("neutral",)
-    model.learn(motions, "the recordings", lids=lids)
+    model.learn(motions, "the recordings", roles=roles, lids=lids)
     return model.eval()
 
 
-def model_for_all(people: list[Motion], lids: list[Motion], corpus: Corpus) -> Eyes:
-    """What comes with the package. How much of the head it undoes is today's constant: no recording here shows any of it."""
-    model = learnt(people, lids, smoothed_s=UNDONE / HEAD_FPS, compensation=0.6)
-    model.provenance = {
-        "performer": "gaze: two people of head_conversation; lids: GRID talker s1",
-        "sources": [
-            "https://github.com/MCMartinLee/Conversation_Demo",
-            "https://doi.org/10.1121/1.2229005",
-        ],
-        "licences": ["MIT (gaze)", "CC BY 4.0: Cooke, Barker, Cunningham, Shao 2006 (lids)"],
-        "consents": ["as the data sets state"],
-        "synthetic": False,
-    }
-    return model
+def as_packaged(seen: People, without: int | None = None, lids: list[Motion] | None = None) -> Eyes:
+    """The model that comes with the package, or what it would be without one of the people.
+
+    Everybody's gaze is brought to the spread of all in that role: people differ more in how far they look than in how.
+    """
+    motions, roles = [], []
+    for role, people in seen.items():
+        some = [most_of(person) for k, person in enumerate(people) if k != without and person]
+        spreads = [np.nanstd(motion.eyes[:, 1:]) for motion in some]
+        usual = np.exp(np.mean(np.log(spreads)))
+        motions += [scaled(motion, usual / spread) for motion, spread in zip(some, spreads, strict=True)]
+        roles += [NUMBERS[role]] * len(some)
+    return learnt(motions, lids, roles, joins="shifts", compensation=COMPENSATION)
+
+
+def most_of(person: list[Motion]) -> Motion:
+    """Up to MOST_S of the pieces of a person."""
+    before_s = np.cumsum([0.0, *(piece.duration_s for piece in person)])[:-1]
+    return in_one([piece for piece, since_s in zip(person, before_s, strict=True) if since_s < MOST_S])
+
+
+def scaled(motion: Motion, gain: float) -> Motion:
+    return replace(motion, eyes=motion.eyes * np.array([1.0, gain, gain], np.float32))
+
+
+PROVENANCE = {
+    "performer": "gaze: twelve people of gaze_conversation; lids: GRID talker s1",
+    "sources": ["Eye gaze during conversation (ETRA 2024)", "https://doi.org/10.1121/1.2229005"],
+    "licences": [
+        "Apache-2.0: Dembinsky, Watanabe, Dengel, Ishimaru 2024 (gaze)",
+        "CC BY 4.0: Cooke, Barker, Cunningham, Shao 2006 (lids)",
+    ],
+    "consents": ["as the data sets state"],
+    "synthetic": False,
+}
 
 
 def draw(person: Motion, lids: list[Motion], packaged: Eyes, path: Path) -> None:
@@ -143,7 +184,7 @@ def draw(person: Motion, lids: list[Motion], packaged: Eyes, path: Path) -> None
     recorded = Motion(person.frames[part], HEAD_FPS, LAYOUT, person.head[part], person.eyes[part])
     shut = shut_level(lids)
     seen = np.concatenate([opening_of(motion, shut)[:, 0] for motion in lids])[: round(20 * lids[0].fps)]
-    made = packaged.look(recorded, seed=1)
+    made = packaged.look(recorded, seed=1, phones=said("speaking", 20.0))
     figure = Figure(figsize=(12, 6), layout="constrained")
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
     for column, (title, motion) in enumerate({"recorded": recorded, "grown": made}.items()):
@@ -181,20 +222,24 @@ def mean_rows(parts: list[dict[str, dict[str, float]]]) -> dict[str, dict[str, f
     return {row: {name: float(np.mean([part[row][name] for part in parts])) for name in parts[0][row]} for row in parts[0]}
 
 
-def fixation_rows(data: Path, role: str, packaged: Eyes) -> dict[str, dict[str, float]]:
-    people = [scanpaths(path, role) for path in sorted((data / "gaze_conversation").glob("*.csv"))]
+def fixation_rows(seen: People, role: str, others_people: list[Motion]) -> dict[str, dict[str, float]]:
     parts = []
-    for left_out, own in enumerate(people):
-        others = [piece for k, person in enumerate(people) if k != left_out for piece in person]
+    for left_out, own in enumerate(seen[role]):
+        others = [piece for k, person in enumerate(seen[role]) if k != left_out for piece in person]
         recorded = pooled([fixation_statistics(piece.eyes[:, 1:].astype(np.float64), FIXATION_FPS) for piece in own])
         if len(recorded["fixation, s"]) < FEWEST:
             continue
         chance = fitted_random([piece.eyes[:, 1:].astype(np.float64) for piece in others], FIXATION_FPS)
+        persons = [in_one(person) for k, person in enumerate(seen[role]) if k != left_out and person]
         lengths = lengths_like(own)
         still = at_rest(LAYOUT, sum(lengths), FIXATION_FPS)
         made = {
-            "texture synthesis": learnt(others).look(still, seed=left_out).eyes,
-            "the package's model (other people)": packaged.look(still, seed=left_out).eyes,
+            "texture synthesis": learnt(persons).look(still, seed=left_out).eyes,
+            "joined anywhere, as in the dissertation": learnt(persons, joins="anywhere").look(still, seed=left_out).eyes,
+            "the package's model without the person": as_packaged(seen, left_out)
+            .look(still, seed=left_out, phones=said(role, still.duration_s))
+            .eyes,
+            "texture synthesis by two people of head_conversation": learnt(others_people).look(still, seed=left_out).eyes,
             "constants": quiet_eyes(np.zeros((len(still), 6)), FIXATION_FPS, None, left_out),
             "random gaze": random_eyes(still.duration_s, FIXATION_FPS, **chance, blinks=17, seed=left_out),
         }
@@ -205,6 +250,12 @@ def fixation_rows(data: Path, role: str, packaged: Eyes) -> dict[str, dict[str, 
             }
         )
     return mean_rows(parts)
+
+
+def said(role: str, duration_s: float) -> PhoneTrack:
+    """Phones of somebody who speaks, or is silent, nearly all the time."""
+    labels = ("pau", "aa") if role == "speaking" else ("aa", "pau")
+    return PhoneTrack(labels, np.array([0.01, duration_s]))
 
 
 def lengths_like(pieces: list[Motion]) -> list[int]:
@@ -220,26 +271,27 @@ def cut(gaze: np.ndarray, lengths: list[int]) -> list[np.ndarray]:
     return np.split(gaze.astype(np.float64), np.cumsum(lengths)[:-1])
 
 
-def gaze_rows(people: list[Motion]) -> dict[str, dict[str, float]]:
+def gaze_rows(people: list[Motion], packaged: Eyes, seen: People) -> dict[str, dict[str, float]]:
     parts = []
+    elsewhere = [piece.eyes[:, 1:].astype(np.float64) for persons in seen.values() for person in persons for piece in person]
     for left_out, own in enumerate(people):
         others = [person for k, person in enumerate(people) if k != left_out]
-        chance = fitted_random([other.eyes[:, 1:].astype(np.float64) for other in others], HEAD_FPS)
         recorded = gaze_statistics(own.eyes[:, 1:].astype(np.float64), own.head, HEAD_FPS)
+        chance = fitted_random([other.eyes[:, 1:].astype(np.float64) for other in others], HEAD_FPS)
+        far_chance = fitted_random(elsewhere, FIXATION_FPS)
         made = {
             "texture synthesis": learnt(others).look(own, seed=left_out).eyes,
-            "the same, made as the package's model": learnt(others, smoothed_s=UNDONE / HEAD_FPS, compensation=0.6)
-            .look(own, seed=left_out)
-            .eyes,
+            "joined anywhere, as in the dissertation": learnt(others, joins="anywhere").look(own, seed=left_out).eyes,
+            "texture synthesis that undoes 0.6": learnt(others, compensation=COMPENSATION).look(own, seed=left_out).eyes,
             "constants": quiet_eyes(own.head, HEAD_FPS, None, left_out),
             "random gaze": random_eyes(own.duration_s, HEAD_FPS, **chance, blinks=17, seed=left_out),
+            "the package's model (gaze_conversation)": packaged.look(own, seed=left_out).eyes,
+            "random gaze by gaze_conversation": random_eyes(own.duration_s, HEAD_FPS, **far_chance, blinks=17, seed=left_out),
         }
-        # what was not learned from averaged gaze, or was sharpened after it, is averaged as the recordings were
-        seen = {
-            row: averaged(eyes[:, 1:].astype(np.float64), 1 if row == "texture synthesis" else AVERAGED)
-            for row, eyes in made.items()
-        }
-        parts.append({row: distances(gaze_statistics(gaze, own.head, HEAD_FPS), recorded) for row, gaze in seen.items()})
+        # what was not learned from averaged gaze is averaged as the recordings were
+        learned = [row for row in made if "synthesis" in row or "anywhere" in row]
+        gazes = {row: averaged(eyes[:, 1:].astype(np.float64), 1 if row in learned else AVERAGED) for row, eyes in made.items()}
+        parts.append({row: distances(gaze_statistics(gaze, own.head, HEAD_FPS), recorded) for row, gaze in gazes.items()})
     return mean_rows(parts)
 
 

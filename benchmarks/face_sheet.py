@@ -1,8 +1,9 @@
-"""Sheets of the built-in head for looking at: visemes, emotions, turned heads, blinks and gazes.
+"""Sheets of the built-in head for looking at: visemes, shapes made by hand from front and side, emotions, heads, blinks, gazes.
 
 python benchmarks/face_sheet.py folder/
 """
 
+import csv
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from PIL import Image, ImageDraw
 from facesynth.face.draw.render import Renderer
 from facesynth.face.rig.arkit_rig import Rig, load_head, pose
 from facesynth.face.rig.markers import LipGap
+from facesynth.methods.coarticulation.by_hand import PHONES_COLUMN, SHIPPED
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
 MOUTH = (540, 380, 740, 560)
@@ -52,6 +54,17 @@ LOOKS = {
 }
 
 
+SIDE = [0.0, 1.3, 0.0]
+PROFILE = (440, 300, 840, 640)
+
+
+def shapes_by_hand() -> dict[str, dict[str, float]]:
+    """The table that comes with facesynth, by its phones."""
+    with SHIPPED["arkit"].open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return {row.pop(PHONES_COLUMN): {name: float(value) for name, value in row.items()} for row in rows}
+
+
 def weights_of(rig: Rig, shapes: dict[str, float]) -> np.ndarray:
     """Weights from names; a name without a side means both sides, `gap` closes the lips to so many mm."""
     weights = np.zeros(52)
@@ -85,6 +98,9 @@ def main(folder: Path) -> None:
 
     mouths = [shot(shapes, [0, 0, 0]) for shapes in VISEMES.values()]
     sheet(mouths, list(VISEMES), 7, MOUTH, 1.3).save(folder / "visemes.png")
+    made = shapes_by_hand()
+    for name, turn, crop in (("by_hand", [0.0, 0.0, 0.0], MOUTH), ("by_hand_side", SIDE, PROFILE)):
+        sheet([shot(shapes, turn) for shapes in made.values()], list(made), 7, crop, 0.8).save(folder / f"{name}.png")
     faces = {f"{emotion} {sound}": EMOTIONS[emotion] | VISEMES[sound] for sound in ("rest", "AA") for emotion in EMOTIONS}
     sheet([shot(shapes, [0, 0, 0]) for shapes in faces.values()], list(faces), 4, FACE, 0.8).save(folder / "emotions.png")
     sheet([shot(*look) for look in LOOKS.values()], list(LOOKS), 4, FACE, 0.8).save(folder / "looks.png")

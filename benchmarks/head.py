@@ -1,10 +1,11 @@
 """Methods of the head on recordings that they did not learn from: distance, correlation, and how like a person they move.
 
-python benchmarks/head.py CORPUS [--parts 5] [--folds 5] [--limit 60] [--methods sway,hmm]
+python benchmarks/head.py CORPUS [--parts 5] [--folds 5] [--limit 60] [--methods sway,hmm] [--model head.safetensors]
 
 Every recording is left out once, a fifth at a time. `recorded elsewhere` is the head of another recording, which knows nothing
 of this sound: its distances of distributions are what chance leaves of a person, its distance what posture and moment make.
---parts cuts recordings into parts of so many seconds, each of which counts as one.
+--parts cuts recordings into parts of so many seconds, each of which counts as one. --model adds a row for a trained model of a
+head, such as one that `train/packaged_head.py` learned from other people.
 """
 
 import argparse
@@ -29,7 +30,8 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.learn.heads import mean_head, poses_of, with_head
-from facesynth.methods.registry import create
+from facesynth.methods.registry import create, load
+from facesynth.motion.resample import resample
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAYOUT = Layout("curves", ("still",))
@@ -57,6 +59,7 @@ def main() -> None:
     parser.add_argument("--folds", type=int, default=5)
     parser.add_argument("--limit", type=int, default=60)
     parser.add_argument("--methods", default="")
+    parser.add_argument("--model", type=Path, action="append", default=[])
     options = parser.parse_args()
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
@@ -66,7 +69,7 @@ def main() -> None:
         print(f"{corpus.performer}: {len(found)} recordings, {minutes:.1f} minutes, {corpus.fps:g} fps, {options.folds} folds\n")
         print(f"| {' | '.join(COLUMNS)} |\n|---|{'---:|' * (len(COLUMNS) - 1)}")
         chosen = [name.strip() for name in options.methods.split(",") if name.strip()]
-        for name, learn in METHODS.items():
+        for name, learn in (METHODS | {path.stem: trained(path) for path in options.model}).items():
             if not chosen or any(one in name for one in chosen):
                 print(row(name, learn, corpus, found, options.folds), flush=True)
 
@@ -107,6 +110,22 @@ def zoo(method: str, config: str = "", *, keyed: bool = False) -> Learner:
         def make(utterance: Utterance) -> NDArray:
             given = {"head_keys": ends_of(utterance)} if keyed else {}
             return model.synthesize(utterance.speech, **given).head
+
+        return make
+
+    return learn
+
+
+def trained(path: Path) -> Learner:
+    """A model that learned from others: its head moves about the mean of the talker's, whose posture it cannot know."""
+
+    def learn(_: Corpus, train: list[Utterance]) -> Maker:
+        model, rest = load(path), mean_head(train)
+
+        def make(utterance: Utterance) -> NDArray:
+            there = resample(model.synthesize(utterance.speech, seed=seed_of(utterance)), utterance.motion.fps).head
+            at = np.minimum(np.arange(len(utterance.motion)), len(there) - 1)
+            return there[at] + rest
 
         return make
 

@@ -2,7 +2,8 @@
 
 python train/packaged_head.py CORPUS... [-o head.safetensors]
 
-Heads are brought to one rate, each recording to its own mean posture; long recordings are cut into parts.
+Heads are brought to one rate, each recording to its own mean posture, and each person's turns to the spread of all: people differ
+more in how far they turn than in how. Long recordings are cut into parts.
 """
 
 import argparse
@@ -35,9 +36,12 @@ def main(arguments: list[str] | None = None) -> None:
         people = [Corpus.open(path) for path in options.corpora]
         name = ", ".join(person.performer for person in people)
         together = Corpus.create(Path(folder) / "heads", performer=name, layout=LAYOUT, fps=FPS, emotions=("neutral",))
-        for number, person in enumerate(people):
+        spreads = [spread_of(person) for person in people]
+        usual = float(np.exp(np.mean(np.log(spreads))))
+        for number, (person, spread) in enumerate(zip(people, spreads, strict=True)):
+            print(f"{person.performer}: turns by {np.degrees(spread):.1f} degrees, taken {usual / spread:.2f} times as far")
             for utterance in [person[i] for i in person.ids]:
-                add_parts(together, f"{number}_{utterance.id}", utterance)
+                add_parts(together, f"{number}_{utterance.id}", utterance, usual / spread)
 
         # One model.
         model = train(HeadHmmMethod, together, load_config(CONFIG), device=options.device)
@@ -46,12 +50,19 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"{options.output}: {model.facts['recordings']} parts learned from, {options.output.stat().st_size / 1e3:.0f} kB")
 
 
-def add_parts(corpus: Corpus, name: str, utterance: Utterance) -> None:
-    """A recording in parts, about its own mean posture."""
+def spread_of(person: Corpus) -> float:
+    """How far a person's head turns about the mean posture of each recording, rad (standard deviation)."""
+    turns = [poses_of(u)[:, :3] for u in (person[i] for i in person.ids) if u.motion.head is not None]
+    away = [one - one.mean(axis=0) for one in turns if np.isfinite(one).all()]
+    return float(np.sqrt(np.mean(np.square(np.concatenate(away)).sum(axis=1))))
+
+
+def add_parts(corpus: Corpus, name: str, utterance: Utterance, gain: float) -> None:
+    """A recording in parts, about its own mean posture, its turns times a gain."""
     motion, speech = utterance.motion, utterance.speech
     if motion.head is None or not np.isfinite(motion.head).all():
         return
-    head = poses_of(utterance) - poses_of(utterance).mean(axis=0)
+    head = gain * (poses_of(utterance) - poses_of(utterance).mean(axis=0))
     alone = resample(Motion(np.zeros((len(motion), 1), np.float32), motion.fps, LAYOUT, head.astype(np.float32)), FPS)
     count = max(1, round(alone.duration_s / PART_S))
     for number, frames in enumerate(np.array_split(np.arange(len(alone)), count)):

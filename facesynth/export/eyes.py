@@ -8,11 +8,11 @@ LATENCY = {"look_ahead_s": None, "about": "an utterance at once; a patch depends
 
 def eyes_content(model: Eyes) -> Content:
     """Everything that the runtime needs of a model; `inference.eyes` reads it."""
-    names = ("patch", "boundary", "tolerance", "compensation")
+    names = ("joins", "patch", "boundary", "tolerance", "compensation")
     return Content(
         graphs=(),
         settings={name: model.facts[name] for name in names},
         latency=LATENCY,
-        arrays={"frames": model.frames.cpu().numpy(), "starts": model.starts.cpu().numpy()},
+        arrays={"frames": model.frames.cpu().numpy(), "starts": model.starts.cpu().numpy(), "roles": model.roles.cpu().numpy()},
         units={"frames": "opening 0..1; gaze to the left, up, rad"},
     )

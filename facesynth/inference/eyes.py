@@ -1,4 +1,7 @@
-"""Eyes from recorded ones: lids and gaze grow together from patches of recordings (Deng 2006, ch. 3), and go with the head."""
+"""Eyes from recorded ones: lids and gaze grow together from patches of recordings (Deng 2006, ch. 3), and go with the head.
+
+Patches are joined where the gaze shifts (`shift_patches`) or, as in the dissertation, anywhere (`patches`).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -14,7 +17,14 @@ from .gaze import head_turns, quick_turns, within_reach
 from .layout import Layout
 from .motion import Motion
 from .patches import Growth, PatchSettings, PatchTexture
-from .speech import Speech
+from .phones import SILENCE
+from .shift_patches import EITHER, LISTENING, SPEAKING, ShiftTexture
+from .speech import PhoneTrack, Speech
+
+SHIFTS, ANYWHERE = "shifts", "anywhere"
+"""Where patches are joined."""
+LISTENING_S = 2.0
+"""Whoever is silent for so long listens."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +39,10 @@ class Parts:
     """[F, 3] recorded opening of the lids and gaze (rad), held against the head's quick turns."""
     starts: NDArray[np.integer]
     """[R] first frame of each recording."""
+    roles: NDArray[np.integer]
+    """[R] what the person did in each recording: EITHER, SPEAKING or LISTENING."""
+    joins: str
+    """Where patches are joined: "shifts" or "anywhere"."""
     settings: PatchSettings
     compensation: float
     """Share of the head's quick turns that the eyes undo."""
@@ -42,20 +56,23 @@ class Eyes:
     def __init__(self, parts: Parts) -> None:
         self.parts, self.manifest = parts, parts.manifest
         self.layout, self.fps, self.emotions = parts.layout, parts.fps, parts.emotions
-        self.texture = PatchTexture(parts.frames.astype(np.float64), parts.starts.astype(np.int64), parts.settings)
+        frames, starts = parts.frames.astype(np.float64), parts.starts.astype(np.int64)
+        self._anywhere = PatchTexture(frames, starts, parts.settings) if parts.joins == ANYWHERE else None
+        self._at_shifts = ShiftTexture(frames, starts, parts.roles.astype(np.int64), self.fps, parts.settings.patch)
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
-        """Eyes for a head that is still; what is said is not heard."""
+        """Eyes for a head that is still; of what is said it counts only whether anything is."""
         reject_options("eyes", options, ("seed",))
-        return self.look(at_rest(self.layout, int(speech.phones.frame_bounds(self.fps)[-1]), self.fps), seed=seed)
+        still = at_rest(self.layout, int(speech.phones.frame_bounds(self.fps)[-1]), self.fps)
+        return self.look(still, seed=seed, phones=speech.phones)
 
-    def look(self, motion: Motion, *, seed: int = 0) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
         """The motion with these eyes, at its own rate, and with a head that follows their wide shifts.
 
         The eyes undo a share of the head's quick turns and all of the turns that follow them. A motion without a head gets
-        one where there are wide shifts; a head of zeros turns as well.
+        one where there are wide shifts; a head of zeros turns as well. With phones, eyes listen where nobody speaks for long.
         """
-        frames = self.grow(len(motion) / motion.fps, seed).frames
+        frames = self.grow(len(motion) / motion.fps, seed, phones).frames
         grown, turns = self._at_times(frames, motion), self._at_times(head_turns(frames[:, 1:], self.fps), motion)
         head = np.zeros((len(motion), 6), np.float32) if motion.head is None else motion.head
         gaze = grown[:, 1:] - self.parts.compensation * quick_turns(head, motion.fps) - turns
@@ -63,13 +80,29 @@ class Eyes:
         head = head + np.pad(np.stack([-turns[:, 1], turns[:, 0]], axis=1), ((0, 0), (0, 4)))
         return replace(motion, eyes=eyes.astype(np.float32), head=head.astype(np.float32))
 
-    def grow(self, duration_s: float, seed: int) -> Growth:
+    def grow(self, duration_s: float, seed: int, phones: PhoneTrack | None = None) -> Growth:
         """Lids and gaze [T, 3] at the recordings' rate, and how they came about; the same at whatever rate they are shown."""
-        return self.texture.grow(int(np.ceil(duration_s * self.fps)) + 1, np.random.default_rng([seed, 3]))
+        count, rng = int(np.ceil(duration_s * self.fps)) + 1, np.random.default_rng([seed, 3])
+        if self._anywhere is not None:
+            return self._anywhere.grow(count, rng)
+        return self._at_shifts.grow(count, rng, roles_of(phones, count, self.fps))
 
     def _at_times(self, frames: Floats, motion: Motion) -> Floats:
         times_s = np.arange(len(frames)) / self.fps
         return np.stack([np.interp(motion.times_s, times_s, column) for column in frames.T], axis=1)
+
+
+def roles_of(phones: PhoneTrack | None, count: int, fps: float) -> NDArray[np.int64]:
+    """[count] SPEAKING, or LISTENING in silences of LISTENING_S and more; EITHER throughout where no phone is known."""
+    roles = np.full(count, EITHER)
+    if phones is None or set(phones.labels) == {SILENCE}:
+        return roles
+    roles[:] = SPEAKING
+    bounds = phones.frame_bounds(fps)
+    silent = np.array([label == SILENCE for label in phones.labels]) & (phones.ends_s - phones.starts_s >= LISTENING_S)
+    for start, stop in zip(bounds[:-1][silent], bounds[1:][silent], strict=True):
+        roles[start:stop] = LISTENING
+    return roles
 
 
 def at_rest(layout: Layout, count: int, fps: float) -> Motion:
@@ -88,6 +121,8 @@ def load_eyes(folder: Folder, threads: int) -> Eyes:
             emotions=tuple(manifest["emotions"]),
             frames=arrays["frames"],
             starts=arrays["starts"],
+            roles=arrays["roles"],
+            joins=str(settings["joins"]),
             settings=PatchSettings(int(settings["patch"]), int(settings["boundary"]), float(settings["tolerance"])),
             compensation=float(settings["compensation"]),
             manifest=manifest,

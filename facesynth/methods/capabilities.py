@@ -13,7 +13,7 @@ from facesynth.inference.errors import FacesynthError
 if TYPE_CHECKING:
     from facesynth.corpus.journal import Edits
     from facesynth.inference.motion import Motion
-    from facesynth.inference.speech import Speech
+    from facesynth.inference.speech import PhoneTrack, Speech
     from facesynth.motion.maps.phone_map import Kind, PhoneMap
 
 Part = Literal["mouth", "expression", "head", "eyes"]
@@ -108,8 +108,8 @@ class MappingEmotions(Protocol):
 class Looking(Protocol):
     """Moves eyes that know of the head."""
 
-    def look(self, motion: Motion, *, seed: int = 0) -> Motion:
-        """The motion with eyes that go with its head, which may turn further where the eyes look far."""
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
+        """The motion with eyes that go with its head, which may turn further where the eyes look far, and with what is said."""
         ...
 
 

@@ -82,7 +82,7 @@ def _looking(cast: Cast, eyes: TrainedModel, motion: Motion, speech: Speech, req
     if (looking := ask(eyes, Looking)) is None:
         own = cast.options(request, speech.phones, eyes)
         return replace(motion, eyes=at_clock(eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
-    looked = looking.look(motion, seed=request.seed)
+    looked = looking.look(motion, seed=request.seed, phones=speech.phones)
     return replace(looked, head=motion.head) if request.head.source == "off" else looked
 
 
@@ -96,7 +96,7 @@ def _account(model: TrainedModel, speech: Speech, request: Request) -> str:
 def packaged_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
     """An `EyeMotion` of the model that comes with the package."""
     still = Motion(np.zeros((len(head), 1), np.float32), fps, Layout("curves", ("still",)), head.astype(np.float32))
-    eyes = _packaged().look(still, seed=seed).eyes
+    eyes = _packaged().look(still, seed=seed, phones=phones).eyes
     return np.zeros((0, 3)) if eyes is None else eyes.astype(np.float64)
 
 

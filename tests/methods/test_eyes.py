@@ -136,7 +136,7 @@ def test_what_teaches_nothing_is_refused_in_a_line(tmp_path):
     with pytest.raises(FacesynthError, match="in a row"):
         learnt(Motion(one.frames, FPS, one.layout, None, drifting))
     with pytest.raises(FacesynthError, match="patch"):
-        learnt(one, patch_s=100.0)
+        learnt(one, joins="anywhere", patch_s=100.0)
     for wrong in ({"patch_s": "long"}, {"boundary": 1.0}, {"tolerance": -1.0}, {"compensation": True}):
         with pytest.raises(FacesynthError, match=next(iter(wrong))):
             Eyes(**wrong)

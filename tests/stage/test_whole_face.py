@@ -11,7 +11,7 @@ from facesynth.face.behaviour.eyes import still_eyes
 from facesynth.inference.eyes import at_rest
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import Part, Request
-from facesynth.stage.whole_face import EYES, packaged_eyes, whole_face
+from facesynth.stage.whole_face import EYES, HEAD, packaged_eyes, whole_face
 from facesynth.zoo.shelf import entry, load
 
 
@@ -81,3 +81,13 @@ def test_the_packages_eyes_live_and_say_from_whom_they_are():
     made = packaged_eyes(np.zeros((60 * 60, 6)), 60.0, None, 0)
     assert ((made[1:, 0] < 0.2) & (made[:-1, 0] >= 0.2)).sum() in range(8, 50)
     assert 0.5 < np.degrees(made[:, 1:].std(axis=0)).min() < np.degrees(made[:, 1:].std(axis=0)).max() < 12
+
+
+def test_the_packages_head_turns_as_people_do_and_says_from_whom_it_is(speech):
+    found = entry(HEAD)
+    assert found.part == "head"
+    licences = [licence for source in load(HEAD).provenance["sources"] for licence in source["licences"]]
+    assert len(licences) == 2
+    assert all(licences)
+    head = load(HEAD).synthesize(speech).head
+    assert 0.2 < np.degrees(np.linalg.norm(head[:, :3].std(axis=0))) < 10

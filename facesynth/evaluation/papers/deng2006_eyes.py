@@ -12,6 +12,7 @@ from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.eyes import ANYWHERE
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.patch_size import PatchSize, patch_size
 
@@ -27,7 +28,7 @@ SIGNALS = ("opening", "gaze to the left, °", "gaze up, °")
 @lru_cache(maxsize=1)
 def learned(material: Material) -> Eyes:
     """The model of all recordings with eyes."""
-    return Eyes().fit(material.corpus, seed=material.seed)
+    return Eyes(joins=ANYWHERE).fit(material.corpus, seed=material.seed)
 
 
 def signals(material: Material) -> list[Finding]:

@@ -171,7 +171,7 @@ class Expression(Method):
             sums = Moments.zero(CONTEXT, width)
             for x, y in ((heard[k], signals[k]) for k in np.flatnonzero(owners == number)):
                 whole = np.isfinite(y).all(axis=1)
-                sums.add(x[whole], y[whole])
+                sums.add(x[whole].astype(np.float32), y[whole].astype(np.float32))
             ((weights[number], constants[number]),) = sums.solutions([DRAWN])
         return weights, constants
 

@@ -5,30 +5,38 @@ from typing import Any, Self
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.eyes import recorded_eyes
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.eyes import ANYWHERE, SHIFTS, Parts
 from facesynth.inference.eyes import Eyes as Runtime
-from facesynth.inference.eyes import Parts
 from facesynth.inference.motion import Motion
 from facesynth.inference.patches import PatchSettings, PatchTexture
-from facesynth.inference.speech import Speech
+from facesynth.inference.shift_patches import EITHER, ShiftTexture
+from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.methods.capabilities import Account
 from facesynth.methods.eyes.capabilities import CAPABILITIES
-from facesynth.methods.eyes.patch_size import patch_size
+from facesynth.methods.eyes.lent_lids import with_lids
+from facesynth.methods.eyes.patch_size import SHUT, patch_size
 from facesynth.methods.eyes.recordings import at_rate, compensation_in, texture_of, whole_pieces
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.lids import opening_of, shut_level
+from facesynth.motion.lids import shut_level
 
 AUTO = "auto"
 """In place of a number that is found in the recordings."""
 LEAST_S = 10.0
 """Of recorded eyes that something can be grown from."""
 LEAST_PIECE_S = 0.5
+BETWEEN_S = 1.0
+"""Eyes follow one recording at least so long between two joins at shifts."""
+FEWEST_UNITS, HELD, HELD_BLINKING = 20, 0.5, 0.8
+"""So many shifts with the rest after them, and so much of the recordings in them, are enough to join patches at shifts; more of
+recordings with blinks, which are rarer where nothing shifts: what is left out would change their rate."""
 FROZEN = 1e-3
 """Deviation of lids, and of gaze (rad), under which nothing moves."""
 
@@ -39,13 +47,16 @@ class Eyes(Method):
 
     Parameters
     ----------
+    joins : "shifts", "anywhere" or "auto"
+        Where patches are joined: where the gaze shifts, so that rests stay as long as recorded, or wherever they fit, as in
+        the dissertation; auto: at shifts, where the recordings have enough of them.
     patch_s : float or "auto"
-        Length of a patch, seconds; auto: where the cumulative curve of intervals between blinks and large saccades bends,
-        but no longer than half of the longest recording.
+        Length of a patch, seconds. Auto: 1 s at least between joins at shifts; else where the cumulative curve of intervals
+        between blinks and large saccades bends, but no longer than half of the longest recording.
     boundary : float
-        Share of the patch that is its boundary zone.
+        Share of the patch that is its boundary zone (anywhere).
     tolerance : float
-        epsilon of eq. 3.4: how unlike boundary zones of patches that follow each other may be.
+        epsilon of eq. 3.4: how unlike boundary zones of patches that follow each other may be (anywhere).
     compensation : float or "auto"
         Share of the head's quick turns that the eyes undo; auto: what the recorded eyes undo.
     smoothed_s : float
@@ -56,9 +67,12 @@ class Eyes(Method):
     """[F, 3] opening, gaze to the left and up (rad), held against the head."""
     starts: Tensor
     """[R] first frame of each piece."""
+    roles: Tensor
+    """[R] what the person did in each piece; see `shift_patches`."""
 
     def __init__(
         self,
+        joins: str = AUTO,
         patch_s: float | str = AUTO,
         boundary: float = 0.2,
         tolerance: float = 0.2,
@@ -73,8 +87,11 @@ class Eyes(Method):
                 "eyes wants patch_s and compensation of 0 or above or auto, a boundary between 0 and 1, and no negative "
                 "tolerance or smoothed_s; got " + ", ".join(f"{name}={value}" for name, value in self.config.items())
             )
+        if joins not in (SHIFTS, ANYWHERE, AUTO):
+            raise FacesynthError(f"eyes wants joins {SHIFTS}, {ANYWHERE} or {AUTO}; got {joins!r}")
         self.register_buffer("frames", torch.zeros(0, 3))
-        self.register_buffer("starts", torch.zeros(0, dtype=torch.int64))
+        for name in ("starts", "roles"):
+            self.register_buffer(name, torch.zeros(0, dtype=torch.int64))
         self._runtime: Runtime | None = None
 
     def fit(self, corpus: Corpus, *, seed: int = 0, lids: Corpus | None = None) -> Self:
@@ -89,35 +106,48 @@ class Eyes(Method):
             self.provenance["lids"] = lids.provenance()
         return self.eval()
 
-    def learn(self, motions: Sequence[Motion], where: str, *, lids: Sequence[Motion] | None = None, seed: int = 0) -> None:
+    def learn(
+        self,
+        motions: Sequence[Motion],
+        where: str,
+        *,
+        roles: Sequence[int] | None = None,
+        lids: Sequence[Motion] | None = None,
+        seed: int = 0,
+    ) -> None:
         """Learn from motions of one rate with eyes; `where` they are from, for errors.
+
+        roles: what the person does in each, see `shift_patches`; None: it is not known.
 
         FacesynthError where there are no eyes, less than 10 s of them, or nothing moves.
         """
-        pieces = _pieces(motions, where)
+        parts = [_pieces_of(motion) for motion in motions]
+        pieces = _enough([piece for part in parts for piece in part], len(motions), where)
+        done = np.repeat(np.full(len(motions), EITHER) if roles is None else np.asarray(roles), [len(part) for part in parts])
         gain, found = self._gain(pieces), compensation_in(pieces)
         shut, smoothed_s = shut_level(pieces), float(self.config["smoothed_s"])
         textures = [texture_of(piece, shut, found, smoothed_s) for piece in pieces]
         self.fps = pieces[0].fps
         if lids is not None:
-            textures = _with_lids(textures, [at_rate(piece, self.fps) for piece in _pieces(lids, "the lent lids")], seed)
+            lent = _enough([piece for motion in lids for piece in _pieces_of(motion)], len(lids), "the lent lids")
+            textures = with_lids(textures, [at_rate(piece, self.fps) for piece in lent], seed)
         if np.concatenate(textures).std(axis=0).max() < FROZEN:
             raise FacesynthError(f"the eyes of {where} are frozen: no lid and no gaze moves; take another corpus")
-        self._keep(textures, PatchSettings(*self._sizes(textures, where), float(self.config["tolerance"])))
+        self._keep(textures, done.astype(np.int64), where)
         self.facts |= {"compensation": gain, "compensation_found": found, "shut_level": shut, "pieces": len(textures)}
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
-        """Eyes for a head that is still, and the head as far as their wide shifts turn it; nothing that is said is heard."""
+        """Eyes for a head that is still, and the head as far as their wide shifts turn it."""
         self.refuse(options)
         return self.runtime().synthesize(speech, seed=seed)
 
-    def look(self, motion: Motion, *, seed: int = 0) -> Motion:
-        """The motion with eyes that go with its head, which wide shifts turn."""
-        return self.runtime().look(motion, seed=seed)
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
+        """The motion with eyes that go with its head, which wide shifts turn; they listen where nobody speaks for long."""
+        return self.runtime().look(motion, seed=seed, phones=phones)
 
     def account(self, speech: Speech, *, seed: int = 0, **options: Any) -> Account:
         """How often nothing that was recorded fitted."""
-        growth = self.runtime().grow(float(speech.phones.ends_s[-1]), seed)
+        growth = self.runtime().grow(float(speech.phones.ends_s[-1]), seed, speech.phones)
         return Account({"patches": len(growth.places), "stuck": growth.stuck, "continued": growth.continued})
 
     def runtime(self) -> Runtime:
@@ -125,55 +155,66 @@ class Eyes(Method):
         layout = self.fitted_layout
         if self._runtime is None:
             settings = PatchSettings(*(self.facts[name] for name in ("patch", "boundary", "tolerance")))
-            frames, starts = (tensor.detach().cpu().numpy() for tensor in (self.frames, self.starts))
-            gain = float(self.facts["compensation"])
-            self._runtime = Runtime(Parts(layout, self.fps, self.emotions, frames, starts, settings, gain))
+            frames, starts, roles = (tensor.detach().cpu().numpy() for tensor in (self.frames, self.starts, self.roles))
+            joins, gain = str(self.facts["joins"]), float(self.facts["compensation"])
+            self._runtime = Runtime(Parts(layout, self.fps, self.emotions, frames, starts, roles, joins, settings, gain))
         return self._runtime
 
     def _gain(self, pieces: Sequence[Motion]) -> float:
         given = self.config["compensation"]
         return compensation_in(pieces) if given == AUTO else float(given)
 
-    def _sizes(self, textures: list[Floats], where: str) -> tuple[int, int]:
+    def _sizes(self, textures: list[Floats], joins: str, where: str) -> tuple[int, int]:
         """Patch and boundary, frames."""
         longest = max(map(len, textures))
         found, given = patch_size(textures, self.fps), self.config["patch_s"]
-        if found is None and given == AUTO:
+        if given != AUTO:
+            patch = round(float(given) * self.fps)
+        elif joins == SHIFTS:
+            patch = round(BETWEEN_S * self.fps)
+        elif found is None:
             raise FacesynthError(f"{where} has no two blinks or large shifts of gaze in a row; record more, or give patch_s")
-        patch = min(found.frames, longest // 2) if found is not None and given == AUTO else round(float(given) * self.fps)
+        else:
+            patch = min(found.frames, longest // 2)
         patch = max(patch, 3)
         self.facts["covered"] = None if found is None else round(found.covered(patch), 4)
         return patch, min(max(1, round(float(self.config["boundary"]) * patch)), patch - 1)
 
-    def _keep(self, textures: list[Floats], settings: PatchSettings) -> None:
-        starts = np.cumsum([0, *map(len, textures)])[:-1]
-        frames = np.concatenate(textures)
-        PatchTexture(frames, starts, settings)  # refuses a patch that no recording holds
-        self.frames, self.starts = (torch.from_numpy(array).to(self.device) for array in (frames.astype(np.float32), starts))
+    def _keep(self, textures: list[Floats], roles: NDArray[np.int64], where: str) -> None:
+        starts, frames = np.cumsum([0, *map(len, textures)])[:-1], np.concatenate(textures)
+        joins = self._joins(ShiftTexture(frames, starts, roles, self.fps, 1), where)
+        settings = PatchSettings(*self._sizes(textures, joins, where), float(self.config["tolerance"]))
+        if joins == ANYWHERE:
+            PatchTexture(frames, starts, settings)  # refuses a patch that no recording holds
+        arrays = {"frames": frames.astype(np.float32), "starts": starts, "roles": roles}
+        device = self.device
+        for name, array in arrays.items():
+            setattr(self, name, torch.from_numpy(array).to(device))
         self._runtime = None
-        self.facts |= {"patch": settings.patch, "boundary": settings.boundary, "tolerance": settings.tolerance}
+        self.facts |= {"joins": joins, "patch": settings.patch, "boundary": settings.boundary, "tolerance": settings.tolerance}
+
+    def _joins(self, texture: ShiftTexture, where: str) -> str:
+        """Where patches are to be joined."""
+        asked, count = str(self.config["joins"]), len(texture.units.first)
+        if asked == SHIFTS and not count:
+            raise FacesynthError(f"no gaze in {where} shifts twice in a recording; record more, or take joins={ANYWHERE}")
+        blinks = bool((texture.frames[:, 0] < SHUT).any())
+        enough = count >= FEWEST_UNITS and texture.held >= (HELD_BLINKING if blinks else HELD)
+        return asked if asked != AUTO else SHIFTS if enough else ANYWHERE
 
 
-def _pieces(motions: Sequence[Motion], where: str) -> list[Motion]:
+def _pieces_of(motion: Motion) -> list[Motion]:
+    return whole_pieces(motion, LEAST_PIECE_S)
+
+
+def _enough(pieces: list[Motion], motions: int, where: str) -> list[Motion]:
+    """The pieces, if there are enough."""
     if not motions:
         raise FacesynthError(f"{where} has no recording with eyes (gaze and lids); capture them from video, or add them")
-    pieces = [piece for motion in motions for piece in whole_pieces(motion, LEAST_PIECE_S)]
     seconds = sum(piece.duration_s for piece in pieces)
     if seconds < LEAST_S:
         raise FacesynthError(f"{where} has {seconds:.1f} s of eyes without gaps; at least {LEAST_S:g} s are needed: record more")
     return pieces
-
-
-def _with_lids(textures: list[Floats], lent: list[Motion], seed: int) -> list[Floats]:
-    """Textures with lids that are grown from somebody else's; whether blinks go with shifts of gaze is lost."""
-    shut = shut_level(lent)
-    own = [opening_of(piece, shut) for piece in lent]
-    size = patch_size([np.pad(lids, ((0, 0), (0, 2))) for lids in own], lent[0].fps)
-    patch = max(3, min(size.frames if size else round(lent[0].fps), max(map(len, own)) // 2))
-    settings = PatchSettings(patch, max(1, patch // 5), 0.2)
-    texture = PatchTexture(np.concatenate(own), np.cumsum([0, *map(len, own)])[:-1], settings)
-    rng = np.random.default_rng([seed, 4])
-    return [np.concatenate([texture.grow(len(one), rng).frames, one[:, 1:]], axis=1) for one in textures]
 
 
 def _is_number(value: object) -> bool:

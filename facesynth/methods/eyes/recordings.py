@@ -19,7 +19,11 @@ MOVING_RAD = 1e-3
 
 
 def whole_pieces(motion: Motion, least_s: float) -> list[Motion]:
-    """The pieces of a motion in which eyes, and the head where there is one, are known for so long without a gap."""
+    """The pieces of a motion in which eyes, and the head where there is one, are known for so long without a gap.
+
+    Gaze counts from its middle over the whole motion: cameras and trackers look from anywhere.
+    """
+    motion = _about_middle(motion)
     signals = [eyes_of(motion), *([] if motion.head is None else [motion.head])]
     present = np.asarray(np.isfinite(np.concatenate(signals, axis=1)).all(axis=1))
     return [_piece(motion, run.start, run.stop) for run in runs(present) if len(run) >= least_s * motion.fps]
@@ -44,12 +48,11 @@ def compensation_in(pieces: Sequence[Motion]) -> float:
 
 
 def texture_of(piece: Motion, shut: float, compensation: float, smoothed_s: float) -> Floats:
-    """[T, 3] a piece as it is grown from: opening that reaches 0 in a blink; gaze about its middle, without smoothing.
+    """[T, 3] a piece as it is grown from: opening that reaches 0 in a blink; gaze without smoothing.
 
     smoothed_s: over how long the gaze was averaged when it was recorded.
     """
-    gaze = held_gaze(piece, compensation)
-    gaze = sharpened(gaze - np.median(gaze, axis=0), round(smoothed_s * piece.fps))
+    gaze = sharpened(held_gaze(piece, compensation), round(smoothed_s * piece.fps))
     return np.concatenate([opening_of(piece, shut), gaze], axis=1)
 
 
@@ -84,6 +87,13 @@ def at_rate(motion: Motion, fps: float) -> Motion:
     frames = np.tile(motion.frames[:1], (len(times_s), 1))
     head = None if motion.head is None else curve(motion.head)
     return replace(motion, frames=frames, fps=fps, head=head, eyes=curve(eyes_of(motion)))
+
+
+def _about_middle(motion: Motion) -> Motion:
+    eyes = eyes_of(motion)
+    known = np.isfinite(eyes[:, 1:]).all(axis=1)
+    middle = np.median(eyes[known, 1:], axis=0) if known.any() else np.zeros(2)
+    return replace(motion, eyes=eyes - np.concatenate([[0.0], middle]).astype(np.float32))
 
 
 def _piece(motion: Motion, start: int, stop: int) -> Motion:
