@@ -48,7 +48,10 @@ def main() -> None:
         folder = asked.keep or Path(temporary)
         files = [long_file(Corpus.open(asked.corpus), 60 * m, folder / f"minutes_{m:g}") for m in minutes]
         for name in COMMANDS:
-            measured = [peak(command(name, Path(asked.model), file)) for file in files]
+            measured = []
+            for m, file in zip(minutes, files, strict=True):
+                measured.append(peak(command(name, Path(asked.model), file)))
+                print(f"{name}, {m:g} min: {measured[-1][0]:.0f} MB, {measured[-1][1]:.0f} s", file=sys.stderr, flush=True)
             cells = [f"{megabytes:.0f} MB, {processor_s:.0f} s" for megabytes, processor_s in measured]
             slope = (measured[-1][0] - measured[0][0]) / max(minutes[-1] - minutes[0], 1e-9)
             print(f"| {name} | " + " | ".join(cells) + f" | {slope:.1f} MB |", flush=True)
