@@ -15,7 +15,7 @@ from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
 from facesynth.evaluation.jobs import Job, read_account, run_job
-from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of
+from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of, sync_of
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.paired import Difference, compare_pairs
 from facesynth.evaluation.part_statistics import PART_COLUMNS
@@ -33,7 +33,7 @@ FOLDS = "folds.json"
 PREDICTIONS = "predictions"
 MAIN = (
     "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
-    "diversity", "emotion_accuracy", "other_phones", "other_visemes", "head_cca", "head_distance",
+    "sync_rate", "two_sample", "diversity", "emotion_accuracy", "other_phones", "other_visemes", "head_cca", "head_distance",
     *(column.name for column in PART_COLUMNS), "train_s", "train_cpu_s", "rtf", "rtf_cpu", "model_mb",
 )  # fmt: skip
 """Columns of the short table; everything is in the CSV and the JSON."""
@@ -196,8 +196,9 @@ def judges_of(corpus: Corpus, folds: Sequence[Fold], tested: Corpus) -> dict[str
     """By tested utterance: one threshold of closure for all, and a recogniser that learned from its fold's other sentences."""
     threshold = Judge.from_recordings(corpus.subset(()), tested).closure_threshold
     judges: dict[str, Judge] = {}
-    for fold in track(folds, "emotion recognisers", len(folds)):
-        judge = Judge(threshold, recogniser_of(corpus.subset(fold.train)))
+    for fold in track(folds, "judges", len(folds)):
+        train = corpus.subset(fold.train)
+        judge = Judge(threshold, recogniser_of(train), sync_of(train))
         judges |= dict.fromkeys(fold.test, judge)
     return judges
 
@@ -249,6 +250,7 @@ def _columns(rows: Sequence[Row], tested: Corpus) -> tuple[Column, ...]:
     """Metrics, the emotion's, the joins', the methods' own figures in order of appearance, and the costs."""
     known = [Column(metric.name, metric.unit_in(tested.layout.unit), metric.best) for metric in METRICS]
     known.append(Column("emotion_accuracy", "1", "high"))
+    known += [Column("sync_rate", "1", "high"), Column("sync_offset", "ms", "0"), Column("two_sample", "1", "low")]
     known += [Column(name, tested.layout.unit, "" if name == "diversity" else "low") for name in VARIETY]
     names = {column.name for column in known}
     own = list(dict.fromkeys(name for row in rows for name in row.values if name not in names))

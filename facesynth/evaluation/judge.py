@@ -9,17 +9,18 @@ import numpy as np
 from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.emotion_recognition import Confusion, EmotionRecogniser
 from facesynth.evaluation.folds import some_of
-from facesynth.evaluation.lips import closure_threshold
+from facesynth.evaluation.lips import closure_threshold, require_parting
 from facesynth.evaluation.metrics import METRICS, Case
 from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.sync import SyncJudge
 from facesynth.evaluation.table import Row
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.methods.capabilities import Part
 
 NAN = float("nan")
-MOST_LEARNED = 400
-"""Utterances are enough to tell emotions apart."""
+MOST_LEARNED, MOST_HEARD = 400, 100
+"""Utterances are enough to tell emotions apart, and to tell what is in step."""
 APART: tuple[Part, ...] = ("head", "eyes")
 """Parts that are moved alone: the face rests meanwhile, and is not judged."""
 
@@ -32,15 +33,18 @@ class Judge:
     """Opening that counts as shut, unit of the layout; NaN where nobody says p, b or m."""
     recogniser: EmotionRecogniser | None
     """None where the training recordings have a single emotion."""
+    sync: SyncJudge | None = None
+    """None where the training recordings are too few, or of no lips."""
 
     @classmethod
     def from_recordings(cls, train: Corpus, test: Corpus) -> Self:
         """The threshold from the truth that is tested on (in all folds), the recogniser from the sentences that are not."""
         try:
             threshold = closure_threshold((utterance.motion, utterance.speech.phones) for utterance in test)
+            require_parting((utterance.motion for utterance in test), threshold)
         except UnavailableError:
             threshold = NAN
-        return cls(threshold, recogniser_of(train))
+        return cls(threshold, recogniser_of(train), sync_of(train))
 
     def figures(self, utterance: Utterance, motion: Motion, part: Part = "mouth") -> Iterator[tuple[str, float, str]]:
         """(metric, value, reason why it is NaN) of one utterance; part: what the method moves, a mouth moving the others too."""
@@ -74,6 +78,14 @@ def recogniser_of(train: Corpus) -> EmotionRecogniser | None:
     return EmotionRecogniser.fit(train.subset(some_of(train.ids, MOST_LEARNED, 0)))
 
 
+def sync_of(train: Corpus) -> SyncJudge | None:
+    """What learned, from at most `MOST_HEARD` utterances, whether lips go with a sound; None where they teach too little."""
+    try:
+        return SyncJudge.learn(train.subset(some_of(train.ids, MOST_HEARD, 0)))
+    except UnavailableError:
+        return None
+
+
 def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion | None:
     """The confusion matrix of (asked, recognised) pairs; None where there are none."""
     return Confusion.of(*zip(*pairs, strict=True)) if pairs else None
@@ -100,6 +112,7 @@ class Tally:
             self.set("emotion_accuracy", NAN, moves_alone(part))
         else:
             self._add_emotion(judge, utterance.emotion, motion)
+            self._add_sync(judge, utterance, motion)
 
     def miss(self, reason: str) -> None:
         """Count an utterance for which there is no motion."""
@@ -125,6 +138,17 @@ class Tally:
         """The method's row."""
         values = {name: tuple(column + [NAN] * (self.count - len(column))) for name, column in self.values.items()}
         return Row(label, values, costs, self.reasons, confusion_of(self.emotions))
+
+    def _add_sync(self, judge: Judge, utterance: Utterance, motion: Motion) -> None:
+        if judge.sync is None:
+            return
+        try:
+            shift_ms = judge.sync.shift_ms(utterance.speech, motion)
+        except UnavailableError as reason:
+            self.reasons.setdefault("sync_rate", str(reason))
+            return
+        self.set("sync_rate", float(shift_ms == 0))
+        self.set("sync_offset", shift_ms)
 
     def _add_emotion(self, judge: Judge, asked: str, motion: Motion) -> None:
         if judge.recogniser is None:

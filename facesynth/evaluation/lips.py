@@ -53,6 +53,15 @@ def closure_threshold(recordings: Iterable[tuple[Motion, PhoneTrack]]) -> float:
     return float(np.percentile(gaps, 90, method="inverted_cdf"))
 
 
+def require_parting(motions: Iterable[Motion], threshold: float) -> None:
+    """UnavailableError where the mean recorded opening is not above a threshold: a face that never moves would seem shut."""
+    openings = [lip_opening(motion) for motion in motions]
+    if np.nanmean(np.concatenate(openings)) <= threshold:
+        raise UnavailableError(
+            "the recorded lips are no nearer at p, b and m than on average: a still face would seem to shut them"
+        )
+
+
 def closure_rate(synthesised: Motion, phones: PhoneTrack, threshold: float) -> float:
     """Share of the p, b and m whose smallest lip gap is not above the threshold (0..1)."""
     smallest = _smallest_gaps(lip_opening(synthesised), phones, synthesised.fps)
@@ -130,7 +139,9 @@ def _gaps_of(gap: Array, phones: PhoneTrack, fps: float, wanted: frozenset[str],
 
 def _known(threshold: float) -> float:
     if np.isnan(threshold):
-        raise UnavailableError("the recordings have no p, b or m to take the threshold from")
+        raise UnavailableError(
+            "there is no threshold: nobody says p, b or m in the recordings, or lips are no nearer there than on average"
+        )
     return threshold
 
 

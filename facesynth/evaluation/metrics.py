@@ -96,6 +96,17 @@ DEFINITIONS: Mapping[str, str] = {
             "emotion_accuracy",
             "Share of utterances whose emotion is recognised by a classifier that saw other sentences recorded.",
         ),
+        (
+            "sync_rate",
+            "Share of utterances that go with their sound best unshifted, of shifts up to 0.2 s either way, for a network that "
+            "learned from recordings of other sentences what is in step.",
+        ),
+        ("sync_offset", "How late (ms) the lips go best with their sound, for that network."),
+        (
+            "two_sample",
+            "Balanced accuracy of a classifier that tells synthesised from recorded lips, by stretches of 0.3 s, and that "
+            "learned from other utterances: 0.5 it guesses, 1 it tells them at a glance.",
+        ),
         ("other_phones", "Share of phones that were taken from a recording of another phone."),
         ("other_visemes", "Share of phones that were taken from another viseme class."),
         ("other_emotions", "Share of phones that were taken from another emotion."),

@@ -14,6 +14,7 @@ from facesynth.evaluation.part_statistics import PART_COLUMNS, PartSums
 from facesynth.evaluation.predictions import Beside, load_prediction, read_beside, sample_paths
 from facesynth.evaluation.second_take import retimed, second_take
 from facesynth.evaluation.table import Row
+from facesynth.evaluation.two_sample import two_sample
 from facesynth.evaluation.variety import VARIETY
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
@@ -50,13 +51,13 @@ class Judged:
 def tally(task: Task) -> Judged:
     """Every figure of every tested utterance; an utterance without a prediction has none, and the reason says so."""
     corpus, spent = Corpus.open(task.corpus).subset(task.known), list[Beside]()
-    figures, sums, parts = Tally(), DetailSums(task.reach), PartSums()
+    figures, sums, parts, motions = Tally(), DetailSums(task.reach), PartSums(), dict[str, Motion]()
     for utterance_id in task.tested:
         motion = read_motion(corpus, task.predictions, task.label, utterance_id)
         if motion is None:
             figures.miss(f"{task.label} has no prediction of some utterances")
             continue
-        utterance = corpus[utterance_id]
+        utterance, motions[utterance_id] = corpus[utterance_id], motion
         figures.add(task.judges[utterance_id], utterance, motion, task.part)
         parts.add(utterance, motion, task.part)
         if task.part not in APART:
@@ -69,6 +70,8 @@ def tally(task: Task) -> Judged:
         if beside := read_beside(path):
             _add_own(figures, beside, motion)
             spent.append(beside)
+    if task.part not in APART:
+        _add_two_sample(figures, task, corpus, motions)
     figures.explain(VARIETY, "no other motion of the same speech: the method draws none, or none lies beside the predictions")
     moved = parts.figures()
     alone = moves_alone(task.part) if task.part in APART else "the method moves neither head nor eyes, or nobody recorded them"
@@ -120,6 +123,19 @@ def _add_variety(figures: Tally, path: Path, motion: Motion, utterance: Utteranc
             figures.set(name, VARIETY[name](samples, utterance.motion))
         except UnavailableError as reason:
             figures.set(name, NAN, str(reason))
+
+
+def _add_two_sample(figures: Tally, task: Task, corpus: Corpus, motions: Mapping[str, Motion]) -> None:
+    """How well a classifier tells this method's lips from recorded ones, utterance by utterance."""
+    shapes = next((judge.sync.shapes for judge in task.judges.values() if judge.sync is not None), None)
+    if shapes is None:
+        return
+    try:
+        told = two_sample(shapes, motions, {utterance_id: corpus[utterance_id].motion for utterance_id in motions})
+    except UnavailableError as reason:
+        figures.explain(["two_sample"], str(reason))
+        return
+    figures.values["two_sample"] = [told.get(utterance_id, NAN) for utterance_id in task.tested]
 
 
 def _add_own(figures: Tally, beside: Beside, motion: Motion) -> None:

@@ -29,6 +29,7 @@ BUILT_IN = {
     for name, value in {
         "mean_face": "baselines.capabilities:MEAN_FACE",
         "phone_mean": "baselines.capabilities:PHONE_MEAN",
+        "viseme_table": "baselines.capabilities:VISEME_TABLE",
         "ridge": "baselines.capabilities:RIDGE",
         "head_rest": "baselines.capabilities:HEAD_REST",
         "head_ridge": "baselines.capabilities:HEAD_RIDGE",

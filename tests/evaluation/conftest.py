@@ -1,8 +1,11 @@
-"""Memory is measured in a process of its own, which takes seconds: one test does, the others do without."""
+"""What takes seconds each time is done without: memory measured in a process of its own, judges that learn what is in step.
+
+The files of those try them; the command line's tests have both.
+"""
 
 import pytest
 
-from facesynth.evaluation import jobs
+from facesynth.evaluation import compare, jobs, judge
 from facesynth.methods import registry
 from facesynth.methods.capabilities import Capabilities
 
@@ -12,6 +15,15 @@ def no_process_for_memory():
     """`peak_mb` is a number that nobody measured."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "peak_speaking_mb", lambda *_: 123.0)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_judges_that_learn():
+    """Nothing is said of lips in step."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compare, "sync_of", lambda train: None)
+        patch.setattr(judge, "sync_of", lambda train: None)
         yield
 
 

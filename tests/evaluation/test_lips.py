@@ -85,6 +85,14 @@ def test_closures_without_anybody_to_close_are_unavailable():
         lips.closure_rate(*said([0.0]), float("nan"))
 
 
+def test_closures_are_refused_where_a_still_face_would_have_them_all():
+    recording = said([5.0, 5.5, 6.0, 6.5], opening=6.2)
+    with pytest.raises(UnavailableError, match="still face"):
+        lips.require_parting([recording[0]], lips.closure_threshold([recording]))
+    parting = said([0.0, 0.5, 1.0, 1.5], opening=6.2)
+    lips.require_parting([parting[0]], lips.closure_threshold([parting]))
+
+
 def test_phones_of_another_motion_are_refused():
     motion, track = said([0, 0, 0, 0])
     with pytest.raises(FacesynthError, match="phones of this motion"):

@@ -5,6 +5,9 @@ from facesynth.methods.capabilities import Capabilities
 HOME = "facesynth.methods.baselines"
 MEAN_FACE = Capabilities("mean_face", "the mean of what was recorded", home=f"{HOME}.mean_face", reference="mean face")
 PHONE_MEAN = Capabilities("phone_mean", "one pose for each phone", home=f"{HOME}.phone_mean", reference="phone mean")
+VISEME_TABLE = Capabilities(
+    "viseme_table", "one fixed shape for each viseme class, cross-faded", home=f"{HOME}.viseme_table", reference="viseme table"
+)
 RIDGE = Capabilities("ridge", "a linear map from sound to motion", home=f"{HOME}.ridge", minutes=1.0, reference="ridge")
 TCN = Capabilities("tcn", "a small temporal convolution network", home=f"{HOME}.tcn", minutes=3.0, reference="tcn")
 HEAD_REST = Capabilities("head_rest", "the head rests", home=f"{HOME}.heads", part="head", reference="head at rest")

@@ -87,6 +87,7 @@ class PosePredictor(nn.Module):
         frames = complete_frames(corpus)
         self.pca = Pca.fit(frames, COMPONENTS).to(device)
         self.scale = self.pca.encode(torch.from_numpy(frames).to(device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
+        self.into, self.onto = self.scale * self.pca.basis.T, self.pca.mean.clone()
         self.network = PoseNetwork(self.reading.width, self.pca.basis.shape[1], seed=seed).to(device)
         return Windows([self.recording(utterance, corpus.emotions) for utterance in corpus], self.reading, self.ahead)
 
@@ -95,9 +96,9 @@ class PosePredictor(nn.Module):
         return PointLoss(layout, self.pca.basis * self.scale, float(self.scale) / len(layout.names) ** 0.5)
 
     def answer_in(self, encode: Callable[[Tensor], Tensor]) -> None:
-        """Let the network's components be told in other coordinates: the affine map of frames that `encode` is."""
-        self.onto = encode(self.pca.mean[None])[0].float().clone()
-        self.into = (encode(self.pca.mean + self.scale * self.pca.basis.T) - self.onto).float()
+        """Let what the network says be told in other coordinates than frames: the affine map of frames that `encode` is."""
+        onto = encode(self.onto[None])[0].float()
+        self.into, self.onto = (encode(self.onto + self.into) - onto).float(), onto.clone()
         self.metric = self.onto.new_ones(len(self.onto))
 
     @property
