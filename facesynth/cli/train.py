@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @click.command("train")
-@click.argument("method")
-@click.argument("corpus", type=click.Path(path_type=Path))
+@click.argument("method", required=False)
+@click.argument("corpus", type=click.Path(path_type=Path), required=False)
 @click.argument("settings", nargs=-1, metavar="[KEY=VALUE]...")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Model file; METHOD.safetensors in this folder otherwise.")
 @click.option("--config", type=click.Path(path_type=Path), help="YAML file of settings; KEY=VALUE goes before it.")
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def train(
     *,
-    method: str,
-    corpus: Path,
+    method: str | None,
+    corpus: Path | None,
     settings: tuple[str, ...],
     output: Path | None,
     config: Path | None,
@@ -44,7 +44,7 @@ def train(
     as_json: bool,
     **who: Any,
 ) -> None:
-    """Train METHOD on CORPUS and write one model file.
+    """Train METHOD on CORPUS and write one model file; without METHOD, what is nearest to recordings, as it is nearest.
 
     METHOD `emotion` makes a detector of emotions in the voice; it also learns from a CSV of sound files
     (file,emotion,speaker,sentence), and extracts the voices' features by --jobs or --engine. The others listen as they
@@ -60,7 +60,8 @@ def train(
     from facesynth.methods.training import train as learn
     from facesynth.stage.speaker_pictures import save_face
 
-    chosen = {**(load_config(config) if config else {}), **parse_settings(settings)}
+    method, corpus, settings, known = _asked(method, corpus, settings)
+    chosen = {**(load_config(config) if config else known), **parse_settings(settings)}
     place, workers = device_of(device or str(chosen.pop("device", "auto"))), Workers(**who)
     path = output or Path(f"{method}.safetensors")
     if method == "emotion":
@@ -107,6 +108,22 @@ def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | No
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+
+
+def _asked(
+    method: str | None, corpus: Path | None, settings: tuple[str, ...]
+) -> tuple[str, Path, tuple[str, ...], Mapping[str, Any]]:
+    """Method, corpus, settings, and those that stand in where no file of them is given: of `train CORPUS [KEY=VALUE]...` too."""
+    from facesynth.methods.registry import DEFAULT, capabilities_of, list_methods
+
+    if method is None:
+        raise click.UsageError("name a corpus, or a method and a corpus")
+    alone = corpus is None or "=" in str(corpus)
+    if not alone and corpus is not None:
+        return method, corpus, settings, {}
+    if method in list_methods() or not Path(method).is_dir():
+        raise click.UsageError(f"{method} is no folder of a corpus; wanted `train CORPUS`, or `train {method} CORPUS`")
+    return DEFAULT, Path(method), (*([str(corpus)] if corpus else []), *settings), capabilities_of(DEFAULT).nearest
 
 
 def _tell_made(path: Path, method: str, channels: int, *, as_json: bool) -> None:

@@ -220,6 +220,8 @@ class Capabilities:
     """So many recordings of each phone in each emotion it should have."""
     reference: str = ""
     """Label of the row that every table of an evaluation has for it; empty for a method that is compared when asked."""
+    nearest: Mapping[str, Any] = field(default_factory=dict)
+    """Settings with which it is nearest to recordings, where its defaults are a paper's: those of `facesynth train CORPUS`."""
     tables: tuple[str, ...] = ()
     """Names of the tables by hand that come with facesynth, each of which is a model without a recording."""
     table_reader: str = ""

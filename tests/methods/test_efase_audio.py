@@ -273,6 +273,8 @@ def test_the_shipped_soft_settings_are_settings_of_efase(repository):
     assert config["temperature"] > 0
     assert config["pose_weight"] > 0
     assert config["learn"]
+    defaults = Efase.from_config(load_config(repository / "configs" / "efase.yaml")).config
+    assert {key: value for key, value in config.items() if value != defaults[key]} == Efase.capabilities.nearest
     still = Efase.from_config(load_config(repository / "configs" / "efase_soft_still.yaml")).config
     assert still == {**config, "sharpening": 0.0, "residual": 0.0}
 
