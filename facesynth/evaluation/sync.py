@@ -123,7 +123,7 @@ def _agreement(heard: Tensor, seen: Tensor, present: Tensor, shift: int) -> floa
 def _offsets_s() -> NDArray[np.float64]:
     """[n] times around a frame at which the sound is heard."""
     count = round(SOUND_FRAMES / RATE * SOUND_RATE)
-    return (np.arange(count) - (count - 1) / 2) / SOUND_RATE
+    return (np.arange(count, dtype=np.float64) - (count - 1) / 2) / SOUND_RATE
 
 
 def _sound_width() -> int:

@@ -122,5 +122,7 @@ def main_emotion(speech: Speech, emotions: tuple[str, ...]) -> int:
 def exported_residual(folder: Folder, arrays: Mapping[str, NDArray[Any]]) -> ResidualMotion | None:
     """Of a folder, whose settings state the share; None where that is 0."""
     share = float(folder.settings["residual"])
-    kept = (arrays[f"residual_{name}"] for name in ARRAYS) if share > 0 else ()
-    return ResidualMotion(*kept, fps=float(folder.manifest["fps"]), share=share) if share > 0 else None
+    if share == 0:
+        return None
+    frames, basis, level, bounds, emotions = (arrays[f"residual_{name}"] for name in ARRAYS)
+    return ResidualMotion(frames, basis, level, bounds, emotions, float(folder.manifest["fps"]), share)

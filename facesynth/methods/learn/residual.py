@@ -56,8 +56,8 @@ class Residual(nn.Module):
 
     def motion(self, fps: float, share: float) -> ResidualMotion | None:
         """What speaks with it; None where nothing was kept."""
-        arrays = (getattr(self, name).cpu().numpy() for name in ARRAYS)
-        return ResidualMotion(*arrays, fps=fps, share=share) if self.any else None
+        frames, basis, level, bounds, emotions = (getattr(self, name).cpu().numpy() for name in ARRAYS)
+        return ResidualMotion(frames, basis, level, bounds, emotions, fps, share) if self.any else None
 
     @property
     def any(self) -> bool:
