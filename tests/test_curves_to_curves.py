@@ -27,7 +27,7 @@ channels:
 def run(*arguments):
     done = CliRunner().invoke(cli, list(map(str, arguments)))
     assert done.exit_code == 0, done.output + repr(done.exception)
-    return done.output
+    return done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ def run(*arguments, code=0):
     if isinstance(result.exception, FacesynthError):
         raise result.exception
     assert result.exit_code == code, result.output
-    return result.output
+    return result.stdout
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ def run(*arguments):
     if isinstance(result.exception, FacesynthError):
         raise result.exception
     assert result.exit_code == 0, result.output
-    return result.output
+    return result.stdout
 
 
 @pytest.fixture

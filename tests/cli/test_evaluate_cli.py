@@ -52,7 +52,7 @@ def test_one_command_makes_a_report_and_its_predictions_make_it_again(corpus, fa
     for name in ("table.csv", "utterances.csv", "comparisons.csv", "phones.csv", "trade.csv", "points.csv"):
         rows = [sorted((tmp_path / part / name).read_text().splitlines()) for part in "ab"]
         assert rows[0] == rows[1] or name == "comparisons.csv"
-    assert {row["label"] for row in json.loads(again.output)["rows"]} == {"second take", "mean_face", "few", "many"}
+    assert {row["label"] for row in json.loads(again.stdout)["rows"]} == {"second take", "mean_face", "few", "many"}
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def run(*arguments):
     if isinstance(result.exception, FacesynthError):
         raise result.exception
     assert result.exit_code == 0, result.output
-    return result.output
+    return result.stdout
 
 
 def test_clips_become_a_corpus_in_one_command(clips, tmp_path):
