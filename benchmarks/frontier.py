@@ -118,7 +118,7 @@ def tell(rows: dict[str, Motions], nearest: float, learned: Corpus, tested: Corp
         own, after = (np.array([figures(m[u.id], u, threshold) for u in tested]) for m in (motions, shut))
         errors[name] = own[:, 0]
         shifts = list(in_step(judge, motions, tested))
-        told = np.mean(list(two_sample(judge.shapes, motions, recorded).values()))
+        told = told_apart(judge, motions, recorded)
         cells = [*np.nanmean(own, axis=0), *np.nanmean(after, axis=0)[[0, 3, 4]], np.mean(np.array(shifts) == 0), told]
         print(f"| {name} | " + " | ".join(f"{cell:.3f}" if k in (0, 5) else f"{cell:.2f}" for k, cell in enumerate(cells)) + " |")
     best = "eFASE soft, lips sharpened, residual"
@@ -127,6 +127,14 @@ def tell(rows: dict[str, Motions], nearest: float, learned: Corpus, tested: Corp
     print(f"\n{best} is nearer than")
     for name, chance in zip(others, chances, strict=True):
         print(f"- {name}: by {np.mean(errors[name] - errors[best]):.3f}, p = {chance:.2g}")
+
+
+def told_apart(judge: SyncJudge, motions: Motions, recorded: Motions) -> float:
+    """How well a classifier tells lips from recorded ones; NaN where too few clips are tested."""
+    try:
+        return float(np.mean(list(two_sample(judge.shapes, motions, recorded).values())))
+    except UnavailableError:
+        return float("nan")
 
 
 def figures(motion: Motion, utterance: Utterance, threshold: float) -> list[float]:
