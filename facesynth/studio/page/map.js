@@ -5,6 +5,7 @@ import { store, watch, changed, currentTake, change, changeTake, startOf, motion
 import * as sound from "/page/sound.js";
 import { make, labelled, choice, refill } from "/page/dom.js";
 import { phoneUnder } from "/page/timeline.js";
+import { path, bitmapOf, paintMarks } from "/page/map_paint.js";
 import * as recording from "/page/recording.js";
 
 const canvas = document.getElementById("map-canvas");
@@ -91,13 +92,8 @@ function heardMap(message) {
 
 async function heardPicture(message) {
   if (!mine(message)) return;
-  const { width, height, extent, numbers } = message;
-  const image = new ImageData(width, height);
-  for (let i = 0, j = 0; i < numbers.length; i += 3, j += 4) {
-    for (let k = 0; k < 3; k++) image.data[j + k] = Math.min(255, 24 + 231 * numbers[i + k]);
-    image.data[j + 3] = 255;
-  }
-  picture = { bitmap: await createImageBitmap(image), extent };
+  const { extent } = message;
+  picture = { bitmap: await bitmapOf(message), extent };
   redraw();
 }
 
@@ -156,29 +152,12 @@ function paint() {
   c.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
   if (!map || !picture) return;
   c.drawImage(picture.bitmap, 0, 0, canvas.clientWidth, canvas.clientHeight);
-  if (marks) paintMarks(c);
+  if (marks) paintMarks(c, map.nodes.map((node, k) => (map.shown[k] && !gone(node) ? toPage(marks.places[2 * k], marks.places[2 * k + 1]) : null)), marks.context);
   const used = store.choices[store.phone]?.node;
   const pin = new Map(currentTake()?.pins ?? []).get(store.phone);
   for (const node of new Set([used, pin])) if (map.place.has(node)) curve(c, node, node === pin ? "#7fc4ff" : "#7bd88f", 2.5);
   if (chosen && map.place.has(chosen)) curve(c, chosen, "#ffffff", 2);
   if (drawing?.length) path(c, drawing.map(([x, y]) => toPage(x, y)), "#ffd166", 2.5);
-}
-
-/** A dot where each node is now; a ring about those that stood between the same phones. */
-function paintMarks(c) {
-  for (let k = 0; k < map.nodes.length; k++) {
-    if (!map.shown[k] || gone(map.nodes[k])) continue;
-    const [x, y] = toPage(marks.places[2 * k], marks.places[2 * k + 1]);
-    c.fillStyle = "#ffffff";
-    c.beginPath();
-    c.arc(x, y, 2, 0, 7);
-    c.fill();
-    if (!marks.context[k]) continue;
-    c.strokeStyle = "#ffd166";
-    c.beginPath();
-    c.arc(x, y, 5.5, 0, 7);
-    c.stroke();
-  }
 }
 
 const gone = (node) => store.project.removed.includes(node);
@@ -190,23 +169,6 @@ function pointsOf(node) {
 
 function curve(c, node, colour, width) {
   path(c, pointsOf(node), colour, width);
-}
-
-/** A line with an arrow at its end. */
-function path(c, places, colour, width) {
-  c.strokeStyle = c.fillStyle = colour;
-  c.lineWidth = width;
-  c.beginPath();
-  for (const [x, y] of places) c.lineTo(x, y);
-  c.stroke();
-  c.lineWidth = 1;
-  const [x, y] = places.at(-1);
-  const from = places.find(([a, b], k) => k >= places.length - 4 && Math.hypot(a - x, b - y) > 2) ?? places[0];
-  const angle = Math.atan2(y - from[1], x - from[0]);
-  c.beginPath();
-  c.moveTo(x + 4 * Math.cos(angle), y + 4 * Math.sin(angle));
-  for (const turn of [2.5, -2.5]) c.lineTo(x + 7 * Math.cos(angle + turn), y + 7 * Math.sin(angle + turn));
-  c.fill();
 }
 
 function moved(event) {
