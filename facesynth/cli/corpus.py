@@ -17,6 +17,7 @@ import click
 from facesynth.cli.corpus_edit import edit
 from facesynth.cli.followed_points import Followed, keep_videos_of, points_followed, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
+from facesynth.cli.transcriber import chosen_transcriber
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -104,6 +105,8 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
 @click.option("--speaker", help="Whose phones are taken, where TextGrids hold those of several.")
 @click.option("--language", help="Of the texts, such as de or pt (ISO 639-1); found out otherwise.")
+@click.option("--transcribe", is_flag=True, help="Let Whisper (`fetch whisper`) write down what is said, where nobody says it.")
+@click.option("--transcriber", type=FOLDER, help="The same by the model of faster-whisper in this folder.")
 @click.option("--emotion", help="Emotion of every recording added; neutral if nothing says otherwise.")
 @click.option("--emotions", type=FILE, help="Emotion that moves over time, for one recording: CSV, or lines of `end emotion`.")
 @click.option("--intensity", type=click.FloatRange(0, 1), help="Intensity of the emotion; 1 otherwise.")
@@ -158,6 +161,7 @@ def add(
 
     listed = read_listed(list_file) if list_file else None
     about = {name: value for name in FACTS if (value := given.pop(name)) is not None}
+    given["transcriber"] = chosen_transcriber(given.pop("transcribe"), given["transcriber"])
     header = _header(folder, performer, about, listed)
     corpus, guessed = _corpus_for(folder, files, header, followed, given["face"], said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)

@@ -4,6 +4,8 @@ import json
 
 import click
 
+SIZES = ("tiny", "base", "small", "medium", "large-v3", "turbo")
+
 
 @click.group("fetch")
 def fetch() -> None:
@@ -35,3 +37,14 @@ def landmarks(as_json: bool) -> None:
 
     folder = fetch_landmarks()
     click.echo(json.dumps({"folder": str(folder), "from": WHEEL}) if as_json else f"the models of {WHEEL} are in {folder}")
+
+
+@fetch.command("whisper")
+@click.option("--size", type=click.Choice(SIZES), default="base", show_default=True, help="Larger ones hear better and slower.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def whisper(size: str, as_json: bool) -> None:
+    """A model that writes down what is said, for --transcribe; faster-whisper downloads it from Hugging Face (base: 145 MB)."""
+    from facesynth.speech.transcription import fetch_whisper
+
+    folder = fetch_whisper(size)
+    click.echo(json.dumps({"folder": str(folder), "size": size}) if as_json else f"the model {size} of Whisper is in {folder}")

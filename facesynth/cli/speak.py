@@ -11,6 +11,7 @@ import click
 
 from facesynth.cli.recordings import is_recording, recordings
 from facesynth.cli.targets import plan_targets, require_free
+from facesynth.cli.transcriber import chosen_transcriber
 from facesynth.cli.types import FILE, Fps, Intensity, PartType, Size, type_of
 from facesynth.inference.errors import FacesynthError
 
@@ -88,6 +89,8 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`.")
 @click.option("--speaker", help="Whose phones are taken, where a TextGrid holds those of several.")
 @click.option("--language", help="Of the text, such as de or pt (ISO 639-1); found out otherwise.")
+@click.option("--transcribe", is_flag=True, help="Let Whisper (`fetch whisper`) write down what is said, where nobody says it.")
+@click.option("--transcriber", type=FILE, help="The same by the model of faster-whisper in this folder.")
 @click.option("--emotion", help="One emotion for everything; `auto`: the one heard in the voice.")
 @click.option("--emotions", type=FILE, help="Emotion over time: CSV, or lines of `end emotion`; `auto`: as heard in the voice.")
 @click.option(
@@ -198,6 +201,7 @@ def _request(text_file: Path | None, given: dict[str, Any]) -> Request:
     from facesynth.stage.listening import read_text
     from facesynth.stage.request import Request
 
+    given["transcriber"] = chosen_transcriber(given.pop("transcribe"), given["transcriber"])
     asked, own = speak.taken_apart(given)
     if text_file is not None:
         if asked["text"] is not None:

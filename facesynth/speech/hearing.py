@@ -34,6 +34,7 @@ def hear(
     phones_path: str | Path | None = None,
     speaker: str | None = None,
     language: str | None = None,
+    transcriber: Path | None = None,
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
@@ -52,6 +53,7 @@ def hear(
         phones_path=phones_path,
         speaker=speaker,
         language=language,
+        transcriber=transcriber,
         emotion=emotion,
         emotions_path=emotions_path,
         intensity=intensity,
@@ -67,6 +69,7 @@ def hear_sound(
     phones_path: str | Path | None = None,
     speaker: str | None = None,
     language: str | None = None,
+    transcriber: Path | None = None,
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
@@ -75,10 +78,10 @@ def hear_sound(
     if phones_path is None:
         require_sound(audio, rate)
     emotions = _emotions(emotion, emotions_path, intensity, len(audio) / rate)
-    found = find_phones(audio, rate, given=phones_path, speaker=speaker, text=text, language=language)
+    found = find_phones(audio, rate, given=phones_path, speaker=speaker, text=text, language=language, transcriber=transcriber)
     if set(found.phones.labels) != {SILENCE}:  # who says that nobody speaks may give a sound without any
         require_sound(audio, rate)
-    spoken = text if text is not None else " ".join(word for word, _, _ in found.words)
+    spoken = text if text is not None else found.text or " ".join(word for word, _, _ in found.words)
     return Heard(Speech(audio, rate, found.phones, emotions, spoken), found.words, found.remarks, found.source)
 
 

@@ -1,7 +1,7 @@
 """The one way to phones: from a sound and what is known of it to a track with times, confidences and remarks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,14 +11,20 @@ from numpy.typing import NDArray
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import align
+from facesynth.speech.audio import require_sound
 from facesynth.speech.languages import ENGLISH, code_of, language_of, pronounced
 from facesynth.speech.phone_archive import DISTRIBUTION, is_installed
 from facesynth.speech.pronunciation import pronounce
 from facesynth.speech.segments import Segment, covering
 from facesynth.speech.textgrid import SAME_LENGTH_S, is_textgrid, read_labelled
 from facesynth.speech.transcript import words_of
+from facesynth.speech.transcription import Transcript, transcribe
 
-Source = Literal["textgrid", "labels", "transcript", "recognition"]
+Source = Literal["textgrid", "labels", "transcript", "transcription", "recognition"]
+PLACED: tuple[Source, ...] = ("transcript", "transcription", "recognition")
+"""By a program: nobody gave the phones."""
+QUOTED = 60
+"""Letters of a transcript that are told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,8 @@ class FoundPhones:
     remarks: tuple[str, ...]
     """What a person should know."""
     source: Source
+    text: str = ""
+    """What a program wrote down; empty where nobody asked for that."""
 
 
 def find_phones(
@@ -42,17 +50,19 @@ def find_phones(
     speaker: str | None = None,
     text: str | None = None,
     language: str | None = None,
+    transcriber: Path | None = None,
 ) -> FoundPhones:
     """Phones of a sound [S], -1..1, at `rate` Hz: those that are given, else aligned with the words, else heard.
 
     given: a TextGrid, of which the phones of `speaker` are taken where it holds several, or lines of `end label`; text: what
     is said; language: of the text (ISO 639-1), found out where nobody says. What is heard without a text may be in any language.
-    FacesynthError where none of it can be used.
+    transcriber: a folder with a model that writes down what is said, where no text is given. FacesynthError where none of it
+    can be used.
     """
     if given is not None:
         return _read(given, len(audio) / rate, speaker)
     if text is None:
-        return _heard(audio, rate)
+        return _heard(audio, rate) if transcriber is None else _transcribed(audio, rate, transcriber, language)
     spoken = code_of(language) if language is not None else language_of(text)
     return _in_english(audio, rate, text) if spoken == ENGLISH else _in_another(audio, rate, text, spoken, given=language)
 
@@ -92,6 +102,33 @@ def _in_another(audio: NDArray[np.float32], rate: int, text: str, code: str, giv
     found = align_words(audio, rate, words)
     remarks = () if given else (f"the transcript is taken to be in the language {code!r}; --language says otherwise",)
     return FoundPhones(found.phones, found.words, (*remarks, *doubts(found.doubtful)), "transcript")
+
+
+# Whisper writes fluent sentences whether they were said or not: what it wrote is believed where its phones lie in what the phone
+# network heard by itself.
+def _transcribed(audio: NDArray[np.float32], rate: int, folder: Path, language: str | None) -> FoundPhones:
+    """By what a program wrote down, where the words fit what is heard; else as without words."""
+    require_sound(audio, rate)
+    written = transcribe(audio, rate, folder, None if language is None else code_of(language))
+    quoted = written.text if len(written.text) <= QUOTED else written.text[:QUOTED] + " …"
+    try:
+        found = find_phones(audio, rate, text=written.text, language=written.language)
+        _require_heard(audio, rate, written)
+    except FacesynthError as error:
+        found = _heard(audio, rate)
+        reason = f"the transcription {quoted!r} ({written.language}) is not used: {error}" if quoted else "nothing was understood"
+        return replace(found, remarks=(reason, *found.remarks))
+    remark = f"transcribed, {written.language}: {quoted!r}; correct the text where it is wrong, and give it"
+    return replace(found, remarks=(remark, *found.remarks), source="transcription", text=written.text)
+
+
+def _require_heard(audio: NDArray[np.float32], rate: int, written: Transcript) -> None:
+    """FacesynthError where English words do not fit what the network hears; those of other languages were placed by it."""
+    if code_of(written.language) != ENGLISH or not is_installed():
+        return
+    from facesynth.speech.text_alignment import align_words
+
+    align_words(audio, rate, [(word, pronounce(word)) for word in words_of(written.text)])
 
 
 def _cross_check(audio: NDArray[np.float32], rate: int, words: Sequence[Segment]) -> tuple[str, ...]:

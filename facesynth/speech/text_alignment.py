@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from facesynth.inference.ear import FRAMES_PER_S, Ear
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import SILENCE, VISEME_CLASSES
+from facesynth.inference.phones import BILABIALS, SILENCE, VISEME_CLASSES
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import PhoneTrack
 from facesynth.inference.spikes import Spike
@@ -36,6 +36,8 @@ SHUFFLES, SHUFFLED = 8, (10, 400)
 DOUBTFUL, SHORTEST_WORD = -3.0, 3
 """A word of so many phones or more with a fit below this is told as one that does not fit: 0.8 % of the words of the 40 clips,
 90 % of those that were put in place of one."""
+INSIDE_S = 0.4
+"""Silence inside a word is a long sound, not a pause, up to this length."""
 PIECE_FRAMES = 3000
 """Longer sounds are cut into pieces of about this length, a minute, where sound and text are surely together."""
 SURELY = 2
@@ -70,9 +72,34 @@ def align_words(audio: NDArray[np.float32], rate: int, words: Sequence[Word]) ->
         raise _mismatch(words, f"its {count} phones are too many for {len(audio) / rate:.1f} s")
     if not belongs(classes, spikes):
         raise _mismatch(words, "what is heard is something else")
-    track = placed(audio, rate, spikes)
+    track = _through_words(placed(audio, rate, spikes, fit=False), spikes)
     spans = _spans(track, words)
     return TextAlignment(track, spans, tuple(spans[number] for number in doubtful(spikes, words)), fit_of(spikes))
+
+
+# Around spikes a long vowel is too short, and the mouth would rest in the middle of a word. Lips stay shut no longer for it.
+def _through_words(track: PhoneTrack, spikes: Sequence[Spike]) -> PhoneTrack:
+    """The track without silences of INSIDE_S or less inside words: the phone before takes them, the one after if that is shut."""
+    begins = [spike.begins_word for spike in spikes]
+    labels, ends_s, sure = list(track.labels), track.ends_s.tolist(), _confidences(track).tolist()
+    spoken = len(spikes)
+    for place in range(len(labels) - 1, -1, -1):
+        if labels[place] != SILENCE:
+            spoken -= 1
+            continue
+        start_s = ends_s[place - 1] if place else 0.0
+        inside = 0 < spoken < len(spikes) and not begins[spoken]
+        if not inside or ends_s[place] - start_s > INSIDE_S:
+            continue
+        if labels[place - 1] not in BILABIALS:
+            ends_s[place - 1] = ends_s[place]
+        for row in (labels, ends_s, sure):
+            del row[place]
+    return PhoneTrack(tuple(labels), np.array(ends_s), np.array(sure))
+
+
+def _confidences(track: PhoneTrack) -> NDArray[np.float64]:
+    return np.ones(len(track.labels)) if track.confidences is None else track.confidences
 
 
 def told(classes: Classes, words: Sequence[Pronunciation]) -> list[Spike] | None:

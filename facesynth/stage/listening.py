@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from facesynth.atomic import write_text
 from facesynth.encoding import encoding_remark, text_of
 from facesynth.inference.emotion_track import track_of
 from facesynth.inference.errors import FacesynthError
@@ -59,6 +60,15 @@ def keep_phones(path: Path, heard: Heard, tell: Tell) -> bool:
     return True
 
 
+def keep_text(path: Path, heard: Heard, tell: Tell) -> bool:
+    """Write what was transcribed, to be corrected; a text that is there and differs stays."""
+    if path.exists() and path.read_bytes() != heard.speech.text.encode():
+        tell(f"warning: {path} was there and differs from what was transcribed: it stays as it is")
+        return False
+    write_text(path, heard.speech.text)
+    return True
+
+
 def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
     text, phones = request.text, request.phones
     if text is None and phones is None:
@@ -68,20 +78,24 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         for remark in encoding_remark(words) if text is not None else ():
             tell(f"warning: {remark}")
     if cast.detector is not None:
-        heard = hear(recording, text=text, phones_path=phones, speaker=request.speaker, language=request.language)
+        heard = hear(recording, text=text, phones_path=phones, **_as_asked(request))
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
     emotion = request.emotion or (None if request.emotions else cast.emotions[0])
     heard = hear(
         recording,
         text=text,
         phones_path=phones,
-        speaker=request.speaker,
-        language=request.language,
+        **_as_asked(request),
         emotion=emotion,
         emotions_path=request.emotions,
         intensity=1.0 if isinstance(request.intensity, Path) else request.intensity,
     )
     return replace(heard, speech=_with_intensity(heard.speech, request))
+
+
+def _as_asked(request: Request) -> dict[str, Any]:
+    """Of the phones."""
+    return {"speaker": request.speaker, "language": request.language, "transcriber": request.transcriber}
 
 
 def _with_emotions(speech: Speech, detector: EmotionDetector, cast: Cast, request: Request, tell: Tell) -> Speech:

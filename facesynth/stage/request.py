@@ -73,6 +73,8 @@ class Request:
     """Whose phones are taken, where a TextGrid holds those of several."""
     language: str | None = None
     """Of the text (ISO 639-1); found out otherwise."""
+    transcriber: Path | None = None
+    """Folder of a model that writes down what is said, where no words are given."""
     emotion: str | None = None
     """One for everything, or AUTO."""
     emotions: str | Path | None = None

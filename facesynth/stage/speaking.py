@@ -15,8 +15,9 @@ from facesynth.methods.registry import ask, own_options, require
 from facesynth.methods.trained import TrainedModel
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.hearing import Heard
+from facesynth.speech.phone_sources import PLACED
 from facesynth.stage.cast import Cast, cast_for
-from facesynth.stage.listening import Tell, keep_phones, listen
+from facesynth.stage.listening import Tell, keep_phones, keep_text, listen
 from facesynth.stage.performance import HeadStage, Written, check_output
 from facesynth.stage.request import Request
 from facesynth.zoo.shelf import load
@@ -115,11 +116,12 @@ class Production:
 
 
 def _phones_beside(targets: Sequence[Path], heard: Heard, remark: Tell) -> list[Path]:
-    """The TextGrid beside the first target, of phones that nobody gave."""
+    """The TextGrid beside the first target, of phones that nobody gave, and the text that was transcribed."""
     if not targets:
         return []
-    grid = targets[0].with_suffix(".TextGrid")
-    return [grid] if heard.source in ("transcript", "recognition") and keep_phones(grid, heard, remark) else []
+    grid, text = (targets[0].with_suffix(suffix) for suffix in (".TextGrid", ".txt"))
+    written = [grid] if heard.source in PLACED and keep_phones(grid, heard, remark) else []
+    return [*written, text] if heard.source == "transcription" and keep_text(text, heard, remark) else written
 
 
 def produce(mouth: TrainedModel, targets: Sequence[Path], request: Request) -> Production:

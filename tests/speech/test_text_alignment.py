@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import VISEME_CLASSES, viseme_of
+from facesynth.inference.phones import SILENCE, VISEME_CLASSES, viseme_of
 from facesynth.inference.spikes import LAG_S
 from facesynth.speech.alignment import align
 from facesynth.speech.ctc_alignment import NOTHING, align_phones, fit_of
@@ -39,6 +39,7 @@ def words(text):
     return [(word, pronounce(word)) for word in words_of(text)]
 
 
+@settings(deadline=None, max_examples=50)
 @given(st.lists(st.sampled_from(["m", "aa", "f", "s", "r", "k"]), min_size=1, max_size=12), st.randoms(use_true_random=False))
 def test_phones_are_placed_where_their_classes_are_told(phones, random):
     frames = np.cumsum([random.randint(2, 9) for _ in phones])
@@ -74,6 +75,8 @@ def test_words_are_placed_near_where_the_aligner_of_english_places_them(say):
     assert [word for word, _, _ in network.words] == [word for word, _, _ in english.words]
     assert np.abs(np.subtract([span[1:] for span in network.words], [span[1:] for span in english.words])).max() < 0.1
     assert network.doubtful == ()
+    pauses = [(start_s, end_s) for label, start_s, end_s in segments_of(network.phones) if label == SILENCE]
+    assert not any(first_s < start_s and end_s < last_s for start_s, end_s in pauses for _, first_s, last_s in network.words)
     assert network.phones.duration_s == len(audio) / rate
 
 

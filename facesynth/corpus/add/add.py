@@ -44,6 +44,7 @@ def add(
     phones: Path | None = None,
     speaker: str | None = None,
     language: str | None = None,
+    transcriber: Path | None = None,
     emotions: Path | None = None,
     face: int | None = None,
     replacing: bool = False,
@@ -54,8 +55,9 @@ def add(
     about: fields of `Record` that hold for every recording; listed: fields that hold instead for the recordings of
     these names; texts: what is said, by name (else the tables among the files say it). phones, emotions: files of the
     one recording that is added. speaker: whose phones are taken of files that hold those of several. language: of the
-    texts; found out otherwise. face: which one is captured from video with several, counted from the left. workers: who
-    reads, captures and aligns; the corpus is the same whoever does.
+    texts; found out otherwise. transcriber: folder of a model that writes down what nobody did. face: which one is captured
+    from video with several, counted from the left. workers: who reads, captures and aligns; the corpus is the same whoever
+    does.
 
     Recordings that are there already are passed over, so an interrupted run can be repeated. Of those of which something
     is given otherwise than before only that is done anew; what is not given this time stays, and so do phones that were
@@ -70,7 +72,7 @@ def add(
     givens = []
     for found in recordings:
         recording = replace(found, phones=phones or found.phones, emotions=emotions or found.emotions)
-        recording = replace(recording, speaker=speaker, language=language)
+        recording = replace(recording, speaker=speaker, language=language, transcriber=transcriber)
         facts = {**about, **(listed or {}).get(recording.name, {})}
         try:
             givens.append(_given(recording, facts, tables.texts, face))

@@ -25,6 +25,7 @@ from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import as_saved, load_audio, read_sound
 from facesynth.speech.emotions import read_emotions
+from facesynth.speech.phone_sources import PLACED
 from facesynth.speech.segments import Segment
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
 
@@ -224,6 +225,7 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
         take.sample_rate,
         text=record.text or None,
         language=recording.language,
+        transcriber=recording.transcriber,
         phones_path=recording.phones,
         speaker=recording.speaker,
     )
@@ -232,7 +234,7 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
 
 
 def _is_aligned(heard: Heard | None) -> bool:
-    return heard is not None and heard.source in ("transcript", "recognition")
+    return heard is not None and heard.source in PLACED
 
 
 def _emotions(corpus: Corpus, record: Record, recording: Recording, duration_s: float) -> EmotionTrack:

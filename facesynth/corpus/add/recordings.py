@@ -49,6 +49,8 @@ class Recording:
     """Whose phones are taken, where their file holds those of several."""
     language: str | None = None
     """Of the text (ISO 639-1); found out otherwise."""
+    transcriber: Path | None = None
+    """Folder of a model that writes down what is said, where no words are given."""
 
 
 def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:
