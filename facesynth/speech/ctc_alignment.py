@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torchaudio.functional import forced_align
 
 from facesynth.inference.ear import FRAMES_PER_S
 from facesynth.inference.phones import VISEME_CLASSES, viseme_of
@@ -62,14 +60,27 @@ def align_phones(classes: Classes, words: Sequence[Sequence[str]], first_s: floa
 
 # Graves et al. 2006, section 4: between the wanted labels any number of blanks may stand, a label lasts one frame or more, and
 # of all such paths the most probable is taken. Wanted are classes, no two neighbours alike, so that no blank need stand anywhere.
+# States are blank, label, blank, label, …, blank; a path stays, goes on by one, or from a label to the next past the blank.
 def _frames(classes: Classes, wanted: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """First and last frame of each of the wanted classes [N]."""
-    path = forced_align(torch.from_numpy(classes)[None], torch.from_numpy(wanted.astype(np.int32))[None], blank=NOTHING)[0][
-        0
-    ].numpy()
-    before = np.concatenate([[NOTHING], path[:-1]])
-    after = np.concatenate([path[1:], [NOTHING]])
-    return np.flatnonzero((path != NOTHING) & (path != before)), np.flatnonzero((path != NOTHING) & (path != after))
+    told = np.full(2 * len(wanted) + 1, NOTHING)
+    told[1::2] = wanted
+    emitted = classes[:, told]
+    best = np.full(len(told) + 2, -np.inf, np.float32)  # two before the first state, from where nothing comes
+    best[2:4] = emitted[0, :2]
+    steps = np.zeros(emitted.shape, np.int8)
+    leaps = np.where(np.arange(len(told)) % 2, 0, -np.inf).astype(np.float32)
+    for frame in range(1, len(classes)):
+        ways = np.stack([best[2:], best[1:-1], best[:-2] + leaps])
+        steps[frame] = ways.argmax(axis=0)
+        best[2:] = ways.max(axis=0) + emitted[frame]
+    state = len(told) - 1 if best[-1] >= best[-2] else len(told) - 2
+    path = np.empty(len(classes), int)
+    for frame in range(len(classes) - 1, -1, -1):
+        path[frame] = state
+        state -= int(steps[frame, state])
+    labels = 2 * np.arange(len(wanted)) + 1
+    return np.searchsorted(path, labels), np.searchsorted(path, labels, side="right") - 1
 
 
 def fit_of(spikes: Sequence[Spike]) -> float:

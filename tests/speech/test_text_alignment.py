@@ -52,6 +52,21 @@ def test_phones_are_placed_where_their_classes_are_told(phones, random):
     assert all(after.first_s > before.first_s for before, after in pairwise(found))
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_best_path_is_the_one_that_torchaudio_finds(seed):
+    torch = pytest.importorskip("torch")
+    from torchaudio.functional import forced_align
+
+    rng = np.random.default_rng(seed)
+    classes = np.log(rng.dirichlet(np.ones(len(VISEME_CLASSES)) / 3, 40)).clip(-30).astype(np.float32)
+    phones = ["m", "aa", "f", "m", "s", "r", "k", "aa"][: 3 + seed]
+    wanted = torch.tensor([[viseme_of(phone) for phone in phones]], dtype=torch.int32)
+    path = forced_align(torch.from_numpy(classes)[None], wanted, blank=NOTHING)[0][0].numpy()
+    starts = np.flatnonzero((path != NOTHING) & (np.diff(path, prepend=NOTHING) != 0))
+    found = align_phones(classes, [phones])
+    assert np.allclose([spike.first_s + LAG_S for spike in found], starts / 50)
+
+
 def test_neighbours_of_one_class_share_a_place_and_each_word_begins_once():
     found = align_phones(spiking(["aa", "n", "m"], [3, 9, 15], 20), [("aa", "n"), ("d", "m")])
     assert [(spike.phone, spike.begins_word) for spike in found] == [("aa", True), ("n", False), ("d", True), ("m", False)]
