@@ -12,9 +12,9 @@ from facesynth.corpus import Corpus
 from facesynth.evaluation.lips import OPEN_VOWELS, closure_rate, closure_threshold, false_closure_rate
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import BILABIALS
-from facesynth.methods.method import Method
-from facesynth.methods.registry import load
+from facesynth.methods.trained import TrainedModel
 from facesynth.speech.hearing import hear
+from facesynth.zoo.shelf import load
 
 STATEMENTS = {"01": "Kids are talking by the door", "02": "Dogs are sitting by the door"}
 FEELINGS = {"01": "neutral", "03": "happy", "04": "sad", "05": "angry"}
@@ -22,7 +22,7 @@ FEELINGS = {"01": "neutral", "03": "happy", "04": "sad", "05": "angry"}
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", type=Path)
+    parser.add_argument("model", help="a file, or a name that `facesynth models` lists")
     parser.add_argument("corpus", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--clips", type=int, default=40)
@@ -56,7 +56,7 @@ def ravdess(folder: Path) -> list[tuple[Path, str, str]]:
     return found
 
 
-def report(name: str, model: Method, clips: list[tuple[Path, str, str]], threshold: float) -> None:
+def report(name: str, model: TrainedModel, clips: list[tuple[Path, str, str]], threshold: float) -> None:
     shut, closures, false, vowels, refused = 0.0, 0, 0.0, 0, 0
     for path, text, emotion in clips:
         try:
