@@ -55,7 +55,7 @@ LOOKS = {
 
 
 SIDE = [0.0, 1.3, 0.0]
-PROFILE = (440, 300, 840, 640)
+PROFILE = (780, 330, 1040, 610)
 
 
 def shapes_by_hand() -> dict[str, dict[str, float]]:
