@@ -82,6 +82,7 @@ def half_angry(page):
     page.page.select_option("#paint-to", "1")
     page.page.select_option("#paint-emotion", "angry")
     page.page.fill("#paint-intensity", "0.5")
+    page.see("document.getElementById('show-emotion').click()")  # the panel is drawn anew whenever something arrives
     page.page.focus("#paint")
     page.after(lambda: page.page.keyboard.press("Enter"))
     assert ["angry", 0.5] in [[region[0], region[2]] for region in page.take()["emotions"]]

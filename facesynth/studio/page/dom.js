@@ -12,6 +12,9 @@ export function make(tag, properties = {}, ...children) {
   return element;
 }
 
+/** Of a field whose value is in nothing but the field until a button is pressed. */
+export const DRAFT = { "data-draft": "" };
+
 export const labelled = (text, field) => make("label", {}, `${text} `, field);
 
 export function choice(options, value, properties = {}) {
@@ -21,9 +24,15 @@ export function choice(options, value, properties = {}) {
   return select;
 }
 
-/** Put children in place, and the focus back on what has the same id. */
+/** Put children in place: the focus goes back to what has the same id, and fields of DRAFT keep what was put into them. */
 export function refill(parent, ...children) {
   const focused = parent.contains(document.activeElement) ? document.activeElement.id : "";
+  const drafts = [...parent.querySelectorAll("[data-draft]")].map((field) => [field.id, field.value]);
   parent.replaceChildren(...children);
+  for (const [id, value] of drafts) keep(document.getElementById(id), value);
   if (focused) document.getElementById(focused)?.focus();
+}
+
+function keep(field, value) {
+  if (field && (field.tagName !== "SELECT" || [...field.options].some((option) => option.value === value))) field.value = value;
 }
