@@ -32,7 +32,7 @@ class FoundPhones:
     """Phones of a sound, and how they were found."""
 
     phones: PhoneTrack
-    """As long as the sound; with confidences where they were heard."""
+    """As long as the sound; with confidences where they were heard, or a file states them."""
     words: tuple[Segment, ...]
     """Word, start and end in seconds; empty where nobody knows the words."""
     remarks: tuple[str, ...]

@@ -1,6 +1,7 @@
 """From labelled stretches of time, as files and aligners give them, to a phone track without gaps."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,7 +51,21 @@ def covering(track: PhoneTrack, duration_s: float) -> PhoneTrack:
     kept = [(label, start, min(end, duration_s)) for label, start, end in segments_of(track) if start < duration_s - TOUCHING_S]
     if kept and duration_s - kept[-1][2] < TOUCHING_S:
         kept[-1] = (*kept[-1][:2], duration_s)
-    return phone_track(kept, duration_s)
+    whole = phone_track(kept, duration_s)
+    if track.confidences is None:
+        return whole
+    return with_confidences(whole, [(*times, sure) for (_, *times), sure in zip(kept, track.confidences, strict=False)])
+
+
+def with_confidences(track: PhoneTrack, said: Iterable[tuple[float, float, float]]) -> PhoneTrack:
+    """The track with the confidence (start and end in seconds, 0 to 1) of each phone that begins and ends so; of others 1."""
+    starts_s, ends_s, sure = np.array(sorted(said), np.float64).reshape(-1, 3).T
+    confidences = np.ones(len(track))
+    if len(sure):
+        nearest = np.minimum(np.searchsorted(starts_s, track.starts_s - TOUCHING_S), len(sure) - 1)
+        off_s = np.maximum(np.abs(starts_s[nearest] - track.starts_s), np.abs(ends_s[nearest] - track.ends_s))
+        confidences = np.where(off_s <= TOUCHING_S, sure[nearest], 1.0)
+    return replace(track, confidences=confidences)
 
 
 def in_one(pieces: Iterable[tuple[float, float, Sequence[Segment]]]) -> list[Segment]:

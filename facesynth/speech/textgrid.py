@@ -14,7 +14,7 @@ from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.phone_labels import label_remarks
 from facesynth.speech.praat import read_grid
-from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of
+from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of, with_confidences
 from facesynth.speech.tiers import following, tiers_of
 
 Words = tuple[Segment, ...]
@@ -50,15 +50,25 @@ def read_labelled(path: str | Path, duration_s: float | None = None, speaker: st
     if not is_textgrid(path):
         return _from_lines(path, duration_s)
     grid = read_grid(path)
-    phones, words, remarks = tiers_of(grid, path, speaker)
+    phones, words, confidences, remarks = tiers_of(grid, path, speaker)
     begin_s = _offset_s(grid.start_s, grid.end_s, duration_s)
     segments, mended = following(_shifted(phones.intervals, begin_s))
     said = following(_shifted(words.intervals if words else (), begin_s))[0]
     spoken = tuple((word.strip(), start_s, end_s) for word, start_s, end_s in said if not is_silence_mark(word))
-    track = _track(path, segments, grid.end_s - begin_s)
+    sure = _shifted(confidences.intervals, begin_s) if confidences else []
+    track, unsure = _with_confidences(_track(path, segments, grid.end_s - begin_s), sure)
     labels = label_remarks(label for label, _, _ in segments)
-    told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels)
+    told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels, *unsure)
     return Labelled(track, spoken, told)
+
+
+def _with_confidences(track: PhoneTrack, said: Sequence[Segment]) -> tuple[PhoneTrack, tuple[str, ...]]:
+    """The track with what a tier says of it, and what a person should know where that is no confidence."""
+    given = [(label.strip(), start_s, end_s) for label, start_s, end_s in said if label.strip()]
+    wrong = next((label for label, _, _ in given if not (_NUMBER.fullmatch(label) and 0 <= float(label) <= 1)), None)
+    if wrong is not None:
+        return track, (f"its tier of confidences says {wrong!r:.40} where a number from 0 to 1 was wanted, and is not used",)
+    return (with_confidences(track, [(start_s, end_s, float(label)) for label, start_s, end_s in given]) if given else track), ()
 
 
 def is_textgrid(path: str | Path) -> bool:
@@ -79,8 +89,8 @@ def read_textgrid(path: str | Path) -> tuple[PhoneTrack, Words]:
 def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment] = ()) -> None:
     """Write tiers `words` and `phones` as a TextGrid (long form, UTF-8), atomically; `read_textgrid` gives the same back.
 
-    A tier `confidence` beside them says how sure each phone is, 0 to 1, where that is known. It is not read: who corrects
-    phones vouches for them.
+    A tier `confidence` beside them says how sure each phone is, 0 to 1, where that is known. A phone whose times are no longer
+    those of its confidence was corrected by somebody who vouches for it: its confidence is 1.
     """
     end_s = phones.duration_s
     said = [(word, start_s, min(stop_s, end_s)) for word, start_s, stop_s in words]

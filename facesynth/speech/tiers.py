@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.speech.phone_labels import QUIET
@@ -12,6 +13,7 @@ from facesynth.speech.segments import Segment
 _PHONES = re.compile(r"phone(?:me|mic|tic)?s?|(?<![a-z])phn?s?(?![a-z])|(?<![a-z])phonalign|^mau$")
 _WORDS = re.compile(r"words?|(?<![a-z])tokensalign|^ort(?:-mau)?$|(?<![a-z])orthograph(?:y|ic)")
 """As the Montreal aligner, ELAN, WebMAUS and SPPAS call them."""
+_CONFIDENCES = re.compile(r"confidences?")
 _BETWEEN = " -_@:./|#,;&"
 """Between the name of a speaker and that of a kind of tier."""
 
@@ -22,8 +24,19 @@ TOLD_S = 1e-9
 """Below this an overlap is the rounding of the last digit."""
 
 
-def tiers_of(grid: Grid, path: Path, speaker: str | None) -> tuple[Tier, Tier | None, tuple[str, ...]]:
-    """The tiers of phones and of words, of the speaker where there are several, and what a person should know.
+class SpeakerTiers(NamedTuple):
+    """What a TextGrid holds of one speaker."""
+
+    phones: Tier
+    words: Tier | None
+    confidences: Tier | None
+    """How sure each phone is, as numbers."""
+    remarks: tuple[str, ...]
+    """What a person should know."""
+
+
+def tiers_of(grid: Grid, path: Path, speaker: str | None) -> SpeakerTiers:
+    """The tiers of the speaker, where there are several, and what a person should know.
 
     FacesynthError where there are no phones, or those of several speakers of which none was chosen.
     """
@@ -34,9 +47,9 @@ def tiers_of(grid: Grid, path: Path, speaker: str | None) -> tuple[Tier, Tier | 
         why = f"; {points[0]!r} is a tier of points, which have no length" if points else ""
         raise FacesynthError(f"{path} has no tier of intervals named 'phones'; its tiers are {names}{why}")
     whose, remarks = _chosen(spoken, path, speaker)
-    words = _by_speaker(grid.tiers, _WORDS)
+    words, confidences = _by_speaker(grid.tiers, _WORDS), _by_speaker(grid.tiers, _CONFIDENCES)
     alone = next(iter(words.values())) if len(words) == 1 and len(spoken) == 1 else None
-    return spoken[whose], words.get(whose, alone), remarks
+    return SpeakerTiers(spoken[whose], words.get(whose, alone), confidences.get(whose), remarks)
 
 
 def _by_speaker(tiers: Sequence[Tier], kind: re.Pattern[str]) -> dict[str, Tier]:

@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import PhoneTrack
+from facesynth.speech.phone_sources import find_phones
 from facesynth.speech.segments import covering, in_one, phone_track, within
-from facesynth.speech.textgrid import read_label_lines, read_textgrid, write_label_lines, write_textgrid
+from facesynth.speech.textgrid import read_label_lines, read_labelled, read_textgrid, write_label_lines, write_textgrid
 
 TRACK = PhoneTrack(("pau", "hh", "ah", "l", "ow", "pau"), np.array([0.1, 0.2, 1 / 3, 0.4, 0.55, 0.9]))
 WORDS = (("hello", 0.1, 0.55),)
@@ -34,6 +35,46 @@ def test_any_track_round_trips(tmp_path_factory, phones):
     for got in (read_textgrid(folder / "a.TextGrid")[0], read_label_lines(folder / "a.lab")):
         assert got.labels == track.labels
         np.testing.assert_allclose(got.ends_s, track.ends_s, atol=1e-6)
+
+
+UNSURE = PhoneTrack(TRACK.labels, TRACK.ends_s, np.array([1.0, 0.25, 0.5, 0.75, 0.33, 1.0]))
+
+
+def test_confidences_come_back_with_the_phones_that_are_given(tmp_path):
+    path, sound = tmp_path / "a.TextGrid", np.full(14400, 0.1, np.float32)
+    write_textgrid(path, UNSURE, WORDS)
+    found = find_phones(sound, 16000, given=path)
+    assert found.phones.confidences.tolist() == UNSURE.confidences.tolist()
+    assert found.remarks == ()
+    write_textgrid(path, TRACK)
+    assert find_phones(sound, 16000, given=path).phones.confidences is None
+
+
+@pytest.mark.parametrize("duration_s", [0.5, 0.85, 1.0])
+def test_confidences_stay_with_their_phones_when_the_sound_has_another_length(tmp_path, duration_s):
+    write_textgrid(tmp_path / "a.TextGrid", UNSURE)
+    got = covering(read_textgrid(tmp_path / "a.TextGrid")[0], duration_s)
+    assert got.duration_s == duration_s
+    assert got.confidences.tolist() == UNSURE.confidences.tolist()[: len(got)]
+
+
+def test_who_moves_a_boundary_vouches_for_the_phones_beside_it(tmp_path):
+    intervals = [("B", 0, 0.2), ("AH", 0.2, 0.5), ("M", 0.5, 0.8), ("AH", 0.8, 1)]
+    sure = [("0.2", 0, 0.2), ("0.3", 0.2, 0.55), ("0.4", 0.55, 0.8), ("0.5", 0.8, 1)]
+    path = tmp_path / "a.TextGrid"
+    path.write_text(grid_text({"Mary - phones": intervals, "Mary - confidence": sure}))
+    assert read_textgrid(path)[0].confidences.tolist() == [0.2, 1.0, 1.0, 0.5]
+
+
+@pytest.mark.parametrize("said", ["sehr sicher", "95", "nan", "-0.1"])
+def test_a_tier_that_holds_no_confidences_is_told_and_left(tmp_path, said):
+    path = tmp_path / "a.TextGrid"
+    path.write_text(grid_text({"phones": [("B", 0, 1)], "confidence": [(said, 0, 1)]}), encoding="utf-8")
+    found = read_labelled(path)
+    assert found.phones.confidences is None
+    assert said in found.remarks[0]
+    path.write_text(grid_text({"phones": [("B", 0, 1)], "confidence": [("", 0, 1)]}))
+    assert read_labelled(path).phones.confidences is None
 
 
 def test_words_with_quotes_and_accents(tmp_path):
