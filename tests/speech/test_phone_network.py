@@ -5,10 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from facesynth.inference.ear import RATE
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.speech.alignment import align
-from facesynth.speech.audio import load_audio
+from facesynth.speech.audio import load_audio, resample
 from facesynth.speech.phone_archive import is_installed
 from facesynth.speech.phone_sources import find_phones
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
@@ -86,7 +87,27 @@ def test_without_words_the_network_hears_and_writes_its_confidence(say, tmp_path
     assert "transcript helps" in found.remarks[0]
     write_textgrid(tmp_path / "a.TextGrid", found.phones)
     assert 'name = "confidence"' in (tmp_path / "a.TextGrid").read_text(encoding="utf-8")
-    assert read_textgrid(tmp_path / "a.TextGrid")[0].labels == found.phones.labels
+    read = read_textgrid(tmp_path / "a.TextGrid")[0]
+    assert read.labels == found.phones.labels
+    np.testing.assert_allclose(read.confidences, found.phones.confidences, atol=0.005)
+
+
+def test_streamed_phones_are_those_of_the_whole_however_the_sound_is_cut(say):
+    """The whole is heard with the windows of the same look-ahead: a cut changes nothing, not even the last bit."""
+    from facesynth.speech.phone_graph import phone_hearing
+
+    audio, rng = resample(*say("Hello, Tom."), RATE), np.random.default_rng(0)
+
+    def streamed(cuts):
+        stream = phone_hearing().stream(look_ahead_s=0.1)
+        pieces = [stream.push(piece) for piece in np.split(audio, cuts)]
+        return [placed for piece in [*pieces, stream.finish()] for placed in piece]
+
+    whole = streamed([])
+    assert sum(one.label != SILENCE for one in whole) >= 5
+    assert whole[-1].end_s == len(audio) / RATE
+    for count in (1, 7, 400):
+        assert streamed(np.sort(rng.integers(0, len(audio) + 1, count))) == whole
 
 
 def test_a_real_talker_closes_lips_where_the_words_say(recordings, recognise):
