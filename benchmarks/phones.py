@@ -2,8 +2,8 @@
 
 FOLDER holds any of `grid_s1`, `ravdess_speech` (words known: the reference is their alignment) and `haskins_ema` (phones
 labelled by hand). Phone error is Levenshtein distance over phones of the reference, viseme error the same over viseme classes
-with repeats merged; closures are p, b, m whose middles lie within 60 ms of each other, one to one. The real-time factor is
-processor time over the sound's length, on one thread.
+with repeats merged; closures are p, b, m whose middles lie within 60 ms of each other, one to one: recall / precision, and how
+many that were heard meet none (false). The real-time factor is processor time over the sound's length, on one thread.
 """
 
 import argparse
@@ -81,7 +81,8 @@ class Score:
         per, ver = self.wrong / max(self.phones, 1), self.wrong_visemes / max(self.visemes, 1)
         recall, precision = self.met / max(self.closures, 1), self.met / max(self.heard_closures, 1)
         factor = self.processor_s / max(self.sound_s, 1e-9)
-        told = f"PER {per:.3f}  VER {ver:.3f}  closures {recall:.3f} / {precision:.3f} of {self.closures}  RTF {factor:.3f}"
+        lips = f"closures {recall:.3f} / {precision:.3f} of {self.closures}, {self.heard_closures - self.met} false"
+        told = f"PER {per:.3f}  VER {ver:.3f}  {lips}  RTF {factor:.3f}"
         return told + (f"  refused {self.refused}" if self.refused else "")
 
 
