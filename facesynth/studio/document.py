@@ -1,6 +1,6 @@
 """What a project says: lines in several takes, and nodes that were removed or drawn. Never changed in place."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
@@ -14,13 +14,16 @@ from facesynth.speech.intensity import IntensityCurve
 
 TIME_DECIMALS = 6
 """Of a second, as files of emotions keep them."""
+CONFIDENCE_DECIMALS = 2
+"""As TextGrids keep them."""
 
 
 class Phone(NamedTuple):
-    """A phone and where it ends."""
+    """A phone, where it ends, and how sure it is (0 to 1) that it was said."""
 
     label: str
     end_s: float
+    confidence: float = 1.0
 
 
 class Word(NamedTuple):
@@ -87,8 +90,9 @@ class Take:
         return self.phones[phone - 1].end_s if phone else 0.0
 
     def phone_track(self) -> PhoneTrack:
-        """As methods take it."""
-        return PhoneTrack(tuple(phone.label for phone in self.phones), np.array([phone.end_s for phone in self.phones]))
+        """As methods take it; without confidences where nothing is doubted."""
+        labels, ends_s, confidences = zip(*self.phones, strict=True)
+        return PhoneTrack(labels, np.array(ends_s), np.array(confidences) if min(confidences) < 1 else None)
 
     def emotion_track(self) -> EmotionTrack:
         """As methods take it, the curve multiplied in."""
@@ -146,8 +150,9 @@ def first_take(phones: PhoneTrack, words: Iterable[tuple[str, float, float]], em
     settled = [Region(label, in_file(end_s), value) for label, end_s, value in regions]
     end_s = float(phones.ends_s[-1])
     said = [Word(label, start_s, min(stop_s, end_s)) for label, start_s, stop_s in words]
-    pairs = zip(phones.labels, phones.ends_s.tolist(), strict=True)
-    return Take("1", tuple(Phone(*pair) for pair in pairs), tuple(said), (*settled[:-1], settled[-1]._replace(end_s=end_s)))
+    sure = np.ones(len(phones)) if phones.confidences is None else phones.confidences.round(CONFIDENCE_DECIMALS)
+    rows = zip(phones.labels, phones.ends_s.tolist(), sure.tolist(), strict=True)
+    return Take("1", tuple(Phone(*row) for row in rows), tuple(said), (*settled[:-1], settled[-1]._replace(end_s=end_s)))
 
 
 def in_file(time_s: float) -> float:
@@ -200,7 +205,7 @@ def take_of(facts: Mapping[str, Any]) -> Take:
     try:
         return Take(
             str(facts["name"]),
-            tuple(Phone(str(label), float(end_s)) for label, end_s in facts["phones"]),
+            tuple(map(phone_of, facts["phones"])),
             tuple(Word(str(label), float(start_s), float(end_s)) for label, start_s, end_s in facts["words"]),
             tuple(Region(str(label), float(end_s), float(value)) for label, end_s, value in facts["emotions"]),
             tuple(CurvePoint(float(time_s), float(value)) for time_s, value in facts.get("curve", ())),
@@ -209,6 +214,15 @@ def take_of(facts: Mapping[str, Any]) -> Take:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise FacesynthError(f"this is no take of a line: {error!r}; wanted name, phones, words and emotions") from None
+
+
+def phone_of(row: Sequence[Any]) -> Phone:
+    """A phone of JSON: label, end and, of those that were heard, a confidence; FacesynthError where that is none."""
+    label, end_s, *confidence = row
+    phone = Phone(str(label), float(end_s), *map(float, confidence))
+    if not 0 <= phone.confidence <= 1:
+        raise FacesynthError(f"how sure a phone is goes from 0 to 1; got {phone.confidence:g} of {phone.label!r:.40}")
+    return phone
 
 
 def _named(kind: str, name: str, things: tuple[Any, ...]) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 
 from facesynth.corpus.files import check_id
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.studio.document import Document, Drawn, Line, Phone, Take, Word, check_phone, settled, take_of
+from facesynth.studio.document import Document, Drawn, Line, Take, Word, check_phone, phone_of, settled, take_of
 
 
 def add_line(document: Document, name: str, text: str, take: Mapping[str, Any], utterance: str) -> Document:
@@ -43,12 +43,14 @@ def set_phones(
     document: Document, line: str, take: str, phones: Sequence[Sequence[Any]], words: Sequence[Sequence[Any]], text: str
 ) -> Document:
     """All phones anew, as an aligner placed them; pins go, for nobody knows which phones they belong to."""
-    ends_s = [float(end_s) for _, end_s in phones]
+    new = tuple(map(phone_of, phones))
+    ends_s = [phone.end_s for phone in new]
+    for phone in new:
+        check_phone(phone.label)
     if not ends_s or any(a >= b for a, b in zip([0.0, *ends_s], ends_s, strict=False)):
         raise FacesynthError("phones need ends that rise from 0, and there must be one")
 
     def change(old: Take) -> Take:
-        new = tuple(Phone(check_phone(str(label)), end_s) for (label, _), end_s in zip(phones, ends_s, strict=True))
         said = tuple(Word(str(label), float(start_s), float(end_s)) for label, start_s, end_s in words)
         if abs(new[-1].end_s - old.duration_s) > 1e-6:
             raise FacesynthError(f"the phones end at {new[-1].end_s:.3f} s, the sound at {old.duration_s:.3f} s")

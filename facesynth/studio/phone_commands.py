@@ -1,4 +1,4 @@
-"""Changes of a take's phones and of what must be said where."""
+"""Changes of a take's phones and of what must be said where. Who changes a phone vouches for it: its confidence is 1."""
 
 from dataclasses import replace
 
@@ -21,7 +21,9 @@ def move_boundary(document: Document, line: str, take: str, phone: int, end_s: f
             Word(w.label, end_s if w.start_s == before_s else w.start_s, end_s if w.end_s == before_s else w.end_s)
             for w in old.words
         )
-        return replace(old, phones=_put(old, phone, old.phones[phone]._replace(end_s=end_s)), words=words)
+        before, after = (vouched._replace(confidence=1.0) for vouched in old.phones[phone : phone + 2])
+        phones = (*old.phones[:phone], before._replace(end_s=end_s), after, *old.phones[phone + 2 :])
+        return replace(old, phones=phones, words=words)
 
     return document.changing(line, take, change)
 
@@ -32,7 +34,8 @@ def relabel(document: Document, line: str, take: str, phone: int, label: str) ->
     def change(old: Take) -> Take:
         _require(old, phone)
         pins = tuple(pin for pin in old.pins if pin.phone != phone or label != SILENCE)
-        return settled(replace(old, phones=_put(old, phone, old.phones[phone]._replace(label=check_phone(label))), pins=pins))
+        named = Phone(check_phone(label), old.phones[phone].end_s)
+        return settled(replace(old, phones=(*old.phones[:phone], named, *old.phones[phone + 1 :]), pins=pins))
 
     return document.changing(line, take, change)
 
@@ -47,7 +50,7 @@ def split_phone(document: Document, line: str, take: str, phone: int, at_s: floa
             raise FacesynthError(f"phone {phone} can be split from {low:.3f} to {high:.3f} s; got {at_s:.3f} s")
         if label == old.phones[phone].label == SILENCE:
             raise FacesynthError("two silences in a row are one; split a silence with a phone")
-        first, second = old.phones[phone]._replace(end_s=at_s), Phone(check_phone(label), old.phones[phone].end_s)
+        first, second = Phone(old.phones[phone].label, at_s), Phone(check_phone(label), old.phones[phone].end_s)
         pins = tuple(Pin(pin.phone + (pin.phone > phone), pin.node) for pin in old.pins)
         phones = (*old.phones[:phone], first, second, *old.phones[phone + 1 :])
         return settled(replace(old, phones=phones, pins=pins))
@@ -60,7 +63,7 @@ def join_phones(document: Document, line: str, take: str, phone: int) -> Documen
 
     def change(old: Take) -> Take:
         _require(old, phone, last=len(old.phones) - 2, what="phone with another after it")
-        joined = old.phones[phone]._replace(end_s=old.phones[phone + 1].end_s)
+        joined = Phone(old.phones[phone].label, old.phones[phone + 1].end_s)
         pins = tuple(Pin(pin.phone - (pin.phone > phone), pin.node) for pin in old.pins if pin.phone != phone + 1)
         return settled(replace(old, phones=(*old.phones[:phone], joined, *old.phones[phone + 2 :]), pins=pins))
 
@@ -95,7 +98,3 @@ def _require(take: Take, phone: int, last: int | None = None, what: str = "phone
     last = len(take.phones) - 1 if last is None else last
     if not 0 <= phone <= last:
         raise FacesynthError(f"there is no {what} {phone}; the take has 0 to {last}")
-
-
-def _put(take: Take, number: int, phone: Phone) -> tuple[Phone, ...]:
-    return (*take.phones[:number], phone, *take.phones[number + 1 :])

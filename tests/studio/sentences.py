@@ -9,6 +9,7 @@ from facesynth.studio.project import Project
 RATE = 16000
 LABELS = ("pau", "hh", "ah", "l", "ow", "pau")
 ENDS_S = (0.2, 0.28, 0.4, 0.47, 0.7, 1.0)
+CONFIDENCES = (1.0, 0.9, 0.4, 0.99, 0.55, 1.0)
 
 
 def sound():
@@ -16,7 +17,8 @@ def sound():
 
 
 def facts():
-    take = first_take(PhoneTrack(LABELS, np.array(ENDS_S)), [("hello", 0.2, 0.7)], EmotionTrack.constant("neutral", 1.0))
+    phones = PhoneTrack(LABELS, np.array(ENDS_S), np.array(CONFIDENCES))
+    take = first_take(phones, [("hello", 0.2, 0.7)], EmotionTrack.constant("neutral", 1.0))
     return {"name": "hello", "text": "hello", "take": take_facts(take), "utterance": ""}
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,6 +15,7 @@ import pytest
 import torch
 from browsing import Page, browser, started
 from corpora import tiny_corpus
+from sentences import ENDS_S
 from serving import TOKEN, Served
 
 from facesynth.atomic import write_text
@@ -207,28 +209,65 @@ class Wobble(Method):
         return Motion(frames, self.fps, self.layout)
 
 
-def test_a_method_that_states_its_options_shows_up_with_them(tiny, tmp_path, rig):
-    performing = Performing.of(Wobble().fit(tiny))
-    head = head_file(tmp_path, performing).read_bytes()
-    served = Served(tmp_path / "served", tiny.path, performing, head)
+@contextmanager
+def wobbling(corpus, folder):
+    """A page with a line of two phones in doubt, and a method that explains nothing."""
+    performing = Performing.of(Wobble().fit(corpus))
+    served = Served(folder / "served", corpus.path, performing, head_file(folder, performing).read_bytes())
     try:
         with browser() as launched:
             page = Page(launched, f"http://{served.host}/?token={TOKEN}")
             page.until("facesynth.store.motion !== null")
-            still = page.see("Array.from(facesynth.store.motion.rows)")
-            page.page.click("#show-options")
-            assert "How much it wobbles" in page.page.inner_text("#inspector")
-            assert page.page.is_visible("#option-backwards")
-            page.page.fill("#option-wobble", "1.5")
-            page.after(lambda: page.page.keyboard.press("Enter"))
-            page.until("facesynth.store.shownRevision === facesynth.store.project.revision")
-            assert page.see("Array.from(facesynth.store.motion.rows)") != still
-            page.page.click("#show-phone")
-            assert "does not tell what it chose" in page.page.inner_text("#inspector")
-            assert page.page.is_disabled("#map-phone")
+            yield page
             assert page.errors == []
     finally:
         served.close()
+
+
+def test_a_method_that_states_its_options_shows_up_with_them(tiny, tmp_path, rig):
+    with wobbling(tiny, tmp_path) as page:
+        still = page.see("Array.from(facesynth.store.motion.rows)")
+        page.page.click("#show-options")
+        assert "How much it wobbles" in page.page.inner_text("#inspector")
+        assert page.page.is_visible("#option-backwards")
+        page.page.fill("#option-wobble", "1.5")
+        page.after(lambda: page.page.keyboard.press("Enter"))
+        page.until("facesynth.store.shownRevision === facesynth.store.project.revision")
+        assert page.see("Array.from(facesynth.store.motion.rows)") != still
+        page.page.click("#show-phone")
+        assert "does not tell what it chose" in page.page.inner_text("#inspector")
+        assert page.page.is_disabled("#map-phone")
+
+
+def test_phones_in_doubt_are_marked_until_somebody_vouches_for_them(tiny, tmp_path, rig):
+    with wobbling(tiny, tmp_path) as page:
+        page.page.click("#show-table")
+        marked = page.page.locator("#inspector .doubted").all_inner_texts()
+        assert [text.strip() for text in marked] == ["? 40 % sure", "? 55 % sure"]
+        assert "90 % sure" in page.page.inner_text("#inspector")
+        assert [dashes(page, k) > 0 for k in range(6)] == [k in (2, 4) for k in range(6)]
+        page.page.click("#show-phone")
+        page.page.mouse.click(*page.place(sum(ENDS_S[1:3]) / 2, "phones"))
+        assert page.page.inner_text("#phone-confidence") == "? 40 % sure"
+        page.after(lambda: page.page.select_option("#phone-label", "aa"))
+        assert page.page.locator("#phone-confidence").count() == 0
+        assert [dashes(page, k) > 0 for k in range(6)] == [k == 4 for k in range(6)]
+
+
+def dashes(page, phone):
+    """How many points beneath a phone have the colour of doubt."""
+    end_s, start_s = ENDS_S[phone], ENDS_S[phone - 1] if phone else 0.0
+    (left, y), (right, _) = page.place(start_s, "phones"), page.place(end_s, "phones")
+    return page.see(
+        f"""(() => {{
+          const canvas = document.getElementById("timeline-canvas"), box = canvas.getBoundingClientRect();
+          const at = [{left} - box.left + 1, {y} - box.top + 8, {right - left} - 2, 5].map(Math.round);
+          const points = canvas.getContext("2d").getImageData(...at).data;
+          let count = 0;
+          for (let k = 0; k < points.length; k += 4) count += points[k] > 240 && points[k + 1] > 190 && points[k + 2] < 130;
+          return count;
+        }})()"""
+    )
 
 
 def test_nothing_serious_for_people_who_cannot_see_or_use_a_mouse(shop, tmp_path):

@@ -7,13 +7,13 @@ import time
 
 import numpy as np
 import pytest
-from sentences import RATE, facts, project_with_line, sound
+from sentences import CONFIDENCES, RATE, facts, project_with_line, sound
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.textgrid import read_textgrid
 from facesynth.studio.commands import changed
-from facesynth.studio.document import Document
+from facesynth.studio.document import Document, take_of
 from facesynth.studio.project import Project
 
 HERE = {"line": "hello", "take": "1"}
@@ -72,7 +72,8 @@ def test_files_say_what_the_take_says(tmp_path, seed):
     played(project, 40, seed)
     take, folder = project.document.line("hello").take("1"), project.take_folder("hello", "1")
     phones, words = read_textgrid(folder / "phones.TextGrid")
-    assert list(zip(phones.labels, phones.ends_s, strict=True)) == list(take.phones)
+    sure = np.ones(len(phones)) if phones.confidences is None else phones.confidences
+    assert list(zip(phones.labels, phones.ends_s, sure, strict=True)) == list(take.phones)
     assert tuple(words) == take.words
     emotions, wanted = read_emotions(folder / "emotions.csv", 1.0), take.emotion_track()
     assert emotions.labels == wanted.labels
@@ -80,6 +81,38 @@ def test_files_say_what_the_take_says(tmp_path, seed):
     np.testing.assert_allclose(emotions.intensities, wanted.intensities, rtol=1e-5)
     assert all(take.phones[pin.phone].label != "pau" for pin in take.pins)
     assert len((folder / "constraints.csv").read_text().splitlines()) == 1 + len(take.pins)
+
+
+@pytest.mark.parametrize(
+    ("do", "what", "vouched"),
+    [
+        ("move_boundary", {"phone": 2, "end_s": 0.41}, {2, 3}),
+        ("relabel", {"phone": 2, "label": "aa"}, {2}),
+        ("join_phones", {"phone": 3}, {3}),
+        ("pin", {"phone": 2, "node": "s01_happy:4"}, set()),
+    ],
+)
+def test_who_changes_a_phone_vouches_for_it(tmp_path, do, what, vouched):
+    project = project_with_line(tmp_path / "p")
+    project.change(do, {**HERE, **what})
+    phones = project.document.line("hello").take("1").phones
+    kept = CONFIDENCES if len(phones) == len(CONFIDENCES) else (*CONFIDENCES[:4], *CONFIDENCES[5:])
+    assert [phone.confidence for phone in phones] == [1.0 if k in vouched else kept[k] for k in range(len(phones))]
+
+
+def test_a_take_that_was_kept_without_confidences_is_read():
+    take = take_of({**facts()["take"], "phones": [["pau", 0.4], ["m", 1.0]]})
+    assert take.phone_track().labels == ("pau", "m")
+    assert take.phone_track().confidences is None
+
+
+@pytest.mark.parametrize("confidence", [float("nan"), -0.1, 95])
+def test_a_confidence_that_is_none_is_refused_before_it_is_kept(tmp_path, confidence):
+    project, said = project_with_line(tmp_path / "p"), facts()
+    said |= {"name": "other", "take": {**said["take"], "phones": [["pau", 0.4], ["m", 1.0, confidence]]}}
+    with pytest.raises(FacesynthError, match="0 to 1"):
+        project.change("add_line", said)
+    assert [line.name for line in project.document.lines] == ["hello"]
 
 
 def test_a_project_comes_back_as_it_was(tmp_path):

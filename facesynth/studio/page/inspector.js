@@ -1,6 +1,6 @@
 // What is chosen, in words and numbers: everything that the canvases do can be done here with the keyboard.
 
-import { store, watch, changed, currentTake, change, changeTake, startOf, regionStart, say } from "/page/store.js";
+import { store, watch, changed, currentTake, change, changeTake, isDoubted, startOf, regionStart, say } from "/page/store.js";
 import { ask } from "/page/link.js";
 import * as sound from "/page/sound.js";
 import { make, labelled, choice, refill, DRAFT } from "/page/dom.js";
@@ -44,9 +44,11 @@ function number(id, value, least, most, done) {
   return field;
 }
 
+const sureness = (row) => `${isDoubted(row) ? "? " : ""}${Math.round(100 * row[2])} % sure`;
+
 function showPhone(take) {
   const k = store.phone;
-  const [label, end] = take.phones[k];
+  const [label, end, confidence = 1] = take.phones[k];
   const pin = new Map(take.pins).get(k);
   const row = store.choices[k];
   const last = k === take.phones.length - 1;
@@ -55,7 +57,8 @@ function showPhone(take) {
       make("button", { id: "phone-before", textContent: "◀", "aria-label": "Phone before", disabled: k === 0, onclick: () => choosePhone(k - 1) }),
       make("h3", { textContent: `Phone ${k} of ${take.phones.length}` }),
       make("button", { id: "phone-after", textContent: "▶", "aria-label": "Phone after", disabled: last, onclick: () => choosePhone(k + 1) }),
-      labelled("Label", choice(PHONES, label, { id: "phone-label", onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) }))),
+      labelled("Label", choice(PHONES, label, { id: "phone-label", onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) })),
+      confidence < 1 ? make("span", { id: "phone-confidence", className: isDoubted(take.phones[k]) ? "doubted" : "", textContent: sureness(take.phones[k]) }) : null),
     make("div", { className: "row" },
       make("span", { textContent: `from ${startOf(take, k).toFixed(3)} s` }),
       last ? make("span", { textContent: `to ${end.toFixed(3)} s, with the sound` })
@@ -182,7 +185,8 @@ function showTable(take) {
     field.addEventListener("change", () => changeTake("move_boundary", { phone: k, end_s: Number(field.value) }));
     return make("tr", { className: k === store.phone ? "selected" : "" },
       make("td", {}, make("button", { textContent: k, "aria-label": `Choose phone ${k}`, onclick: () => choosePhone(k) })),
-      make("td", {}, choice(PHONES, label, { "aria-label": `Label of phone ${k}`, onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) })),
+      make("td", {}, choice(PHONES, label, { "aria-label": `Label of phone ${k}`, onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) }),
+        (take.phones[k][2] ?? 1) < 1 ? make("span", { className: isDoubted(take.phones[k]) ? "doubted" : "", textContent: ` ${sureness(take.phones[k])}` }) : ""),
       make("td", { textContent: startOf(take, k).toFixed(3) }), make("td", {}, field),
       make("td", { className: `quality ${quality ?? ""}`, textContent: quality ? `${QUALITY[quality].slice(0, 1)} ${store.choices[k].node}` : "" }),
       make("td", { textContent: pins.get(k) ? "yes" : "" }));

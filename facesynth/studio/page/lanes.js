@@ -1,6 +1,6 @@
 // Drawing the lanes of the timeline: only what is in sight.
 
-import { store, indexAt, startOf, rowAt } from "/page/store.js";
+import { store, indexAt, isDoubted, startOf, rowAt } from "/page/store.js";
 import { peaks, loop } from "/page/sound.js";
 import { view, x, at } from "/page/view.js";
 
@@ -78,14 +78,17 @@ export function drawWords(c, lane, take) {
   }
 }
 
+/** A phone that is doubted has a question mark, its colour and a dashed line beneath. */
 export function drawPhones(c, lane, take) {
   each(take.phones, (k, label, start, end) => {
     if (k === store.phone) {
       c.fillStyle = "#2f5f8a";
       c.fillRect(x(start), lane.top, x(end) - x(start), lane.height);
     }
-    c.fillStyle = label === "pau" ? COLOURS.soft : COLOURS.text;
-    clipped(c, label, x(start), x(end), lane);
+    const doubted = isDoubted(take.phones[k]);
+    c.fillStyle = doubted ? COLOURS.fair : label === "pau" ? COLOURS.soft : COLOURS.text;
+    clipped(c, doubted ? `${label}?` : label, x(start), x(end), lane);
+    if (doubted) for (let left = x(start) + 2; left < x(end) - 2; left += 6) c.fillRect(left, lane.top + lane.height - 3, Math.min(3, x(end) - 2 - left), 2);
     c.strokeStyle = "#8493a6";
     line(c, x(end), lane.top, x(end), lane.top + lane.height);
   });

@@ -35,6 +35,9 @@ export function changed(kind) {
 export const currentLine = () => store.lines.get(store.line) ?? null;
 export const currentTake = () => currentLine()?.takes.find((take) => take.name === store.take) ?? null;
 export const startOf = (take, phone) => (phone > 0 ? take.phones[phone - 1][1] : 0);
+/** A phone that was heard with less confidence should be listened to. */
+const DOUBTED = 0.6;
+export const isDoubted = ([, , confidence = 1]) => confidence < DOUBTED;
 export const regionStart = (take, region) => (region > 0 ? take.emotions[region - 1][1] : 0);
 export const duration = () => currentTake()?.duration_s ?? 0;
 
