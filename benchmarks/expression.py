@@ -47,7 +47,7 @@ def main(path: Path, seed: int = 0) -> None:
     for model in (whole, space):
         print(f"eigenspace of {model.basis.shape[1]} dimensions: {model.facts['variance']:.1%} of the variance")
     print(f"phones tell {space.facts['told_by_phones']:.1%} of the variance within emotions")
-    print(f"{'':34s} {'unit cube':>10s} {'recognised':>11s} {'upper face':>11s} {'lips':>6s}")
+    print(f"{'':34s} {'unit cube':>10s} {'recognised':>11s} {'upper face':>11s} {'lips':>6s} {'nearer than the mean one':>32s}")
     means = mean_differences(train)
     rows: dict[str, Row] = {
         "neutral": lambda u, motion, _: motion,
@@ -59,29 +59,44 @@ def main(path: Path, seed: int = 0) -> None:
         "eFASE in the emotion": lambda u, motion, _: mouth.synthesize(u.speech),
     }
     print(f"{'recorded':34s} {'':10s} {np.mean([recogniser.recognise(u.motion) == u.emotion for u in said]):11.2f}")
+    beside = distances([rows["mean difference"](u, motion, 0) for u, motion in zip(said, neutral, strict=True)], said)
     for name, row in rows.items():
-        told(name, [row(u, motion, seed + n) for n, (u, motion) in enumerate(zip(said, neutral, strict=True))], said, recogniser)
+        made = [row(u, motion, seed + n) for n, (u, motion) in enumerate(zip(said, neutral, strict=True))]
+        told(name, made, said, recogniser, beside)
     for intensity in INTENSITIES:
         made = [
             space.express(motion, in_emotion(u.speech, u.emotion, intensity), seed=seed + n)
             for n, (u, motion) in enumerate(zip(said, neutral, strict=True))
         ]
-        told(f"expression at {intensity:g}", made, said, recogniser)
+        told(f"expression at {intensity:g}", made, said, recogniser, beside)
         if intensity == 0:
             same = all(a.frames.tobytes() == b.frames.tobytes() for a, b in zip(made, neutral, strict=True))
             print(f"{'':34s} the neutral motion to the byte: {'yes' if same else 'NO'}")
 
 
-def told(name: str, made: list[Motion], said: list[Utterance], recogniser: EmotionRecogniser) -> None:
+def distances(made: list[Motion], said: list[Utterance]) -> NDArray[np.float64]:
+    """[N] unit-cube RMS of each motion to the recorded one."""
+    pairs = [(motion, u.motion) for motion, u in zip(made, said, strict=True)]
+    return np.array([unit_cube_rms(a.frames[present(b)], b.frames[present(b)], b.layout) for a, b in pairs])
+
+
+def told(
+    name: str, made: list[Motion], said: list[Utterance], recogniser: EmotionRecogniser, beside: NDArray[np.float64]
+) -> None:
+    """A line; beside [N]: distances of the mean difference, against which each utterance is compared."""
     layout = said[0].motion.layout
     pairs = [(motion, u.motion) for motion, u in zip(made, said, strict=True)]
-    near = np.mean([unit_cube_rms(a.frames[present(b)], b.frames[present(b)], layout) for a, b in pairs])
+    near = distances(made, said)
+    gained = beside - near
+    again = np.random.default_rng(0).choice(gained, (2000, len(gained))).mean(axis=1)
+    low, high = 1e4 * np.quantile(again, [0.025, 0.975])
+    paired = f"{(gained > 0).sum()} of {len(gained)}, by {1e4 * gained.mean():.1f} [{low:.1f}, {high:.1f}] e-4"
     right = np.mean([recogniser.recognise(motion) == u.emotion for motion, u in zip(made, said, strict=True)])
     upper, lips = (
         np.mean([energy_ratio(part(a, points), part(b, points)) for a, b in pairs])
         for points in (upper_face_points(layout), lip_points(layout))
     )
-    print(f"{name:34s} {near:10.4f} {right:11.2f} {upper:11.2f} {lips:6.2f}", flush=True)
+    print(f"{name:34s} {near.mean():10.4f} {right:11.2f} {upper:11.2f} {lips:6.2f} {paired:>32s}", flush=True)
 
 
 def present(motion: Motion) -> NDArray[np.bool_]:

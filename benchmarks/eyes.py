@@ -184,7 +184,7 @@ def draw(person: Motion, lids: list[Motion], packaged: Eyes, path: Path) -> None
     recorded = Motion(person.frames[part], HEAD_FPS, LAYOUT, person.head[part], person.eyes[part])
     shut = shut_level(lids)
     seen = np.concatenate([opening_of(motion, shut)[:, 0] for motion in lids])[: round(20 * lids[0].fps)]
-    made = packaged.look(recorded, seed=1, phones=said("speaking", 20.0))
+    made = packaged.look(recorded, seed=1, phones=said("speaking", 20.0), turning=False)
     figure = Figure(figsize=(12, 6), layout="constrained")
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
     for column, (title, motion) in enumerate({"recorded": recorded, "grown": made}.items()):
@@ -234,12 +234,10 @@ def fixation_rows(seen: People, role: str, others_people: list[Motion]) -> dict[
         lengths = lengths_like(own)
         still = at_rest(LAYOUT, sum(lengths), FIXATION_FPS)
         made = {
-            "texture synthesis": learnt(persons).look(still, seed=left_out).eyes,
-            "joined anywhere, as in the dissertation": learnt(persons, joins="anywhere").look(still, seed=left_out).eyes,
-            "the package's model without the person": as_packaged(seen, left_out)
-            .look(still, seed=left_out, phones=said(role, still.duration_s))
-            .eyes,
-            "texture synthesis by two people of head_conversation": learnt(others_people).look(still, seed=left_out).eyes,
+            "texture synthesis": eyes_of(learnt(persons), still, left_out),
+            "joined anywhere, as in the dissertation": eyes_of(learnt(persons, joins="anywhere"), still, left_out),
+            "the package's model without the person": eyes_of(as_packaged(seen, left_out), still, left_out, role),
+            "texture synthesis by two people of head_conversation": eyes_of(learnt(others_people), still, left_out),
             "constants": quiet_eyes(np.zeros((len(still), 6)), FIXATION_FPS, None, left_out),
             "random gaze": random_eyes(still.duration_s, FIXATION_FPS, **chance, blinks=17, seed=left_out),
         }
@@ -250,6 +248,12 @@ def fixation_rows(seen: People, role: str, others_people: list[Motion]) -> dict[
             }
         )
     return mean_rows(parts)
+
+
+def eyes_of(model: Eyes, motion: Motion, seed: int, role: str | None = None) -> np.ndarray:
+    """[T, 3] eyes beside a head as it was recorded, or where somebody looks: no head follows."""
+    phones = None if role is None else said(role, motion.duration_s)
+    return model.look(motion, seed=seed, phones=phones, turning=False).eyes
 
 
 def said(role: str, duration_s: float) -> PhoneTrack:
@@ -280,12 +284,12 @@ def gaze_rows(people: list[Motion], packaged: Eyes, seen: People) -> dict[str, d
         chance = fitted_random([other.eyes[:, 1:].astype(np.float64) for other in others], HEAD_FPS)
         far_chance = fitted_random(elsewhere, FIXATION_FPS)
         made = {
-            "texture synthesis": learnt(others).look(own, seed=left_out).eyes,
-            "joined anywhere, as in the dissertation": learnt(others, joins="anywhere").look(own, seed=left_out).eyes,
-            "texture synthesis that undoes 0.6": learnt(others, compensation=COMPENSATION).look(own, seed=left_out).eyes,
+            "texture synthesis": eyes_of(learnt(others), own, left_out),
+            "joined anywhere, as in the dissertation": eyes_of(learnt(others, joins="anywhere"), own, left_out),
+            "texture synthesis that undoes 0.6": eyes_of(learnt(others, compensation=COMPENSATION), own, left_out),
             "constants": quiet_eyes(own.head, HEAD_FPS, None, left_out),
             "random gaze": random_eyes(own.duration_s, HEAD_FPS, **chance, blinks=17, seed=left_out),
-            "the package's model (gaze_conversation)": packaged.look(own, seed=left_out).eyes,
+            "the package's model (gaze_conversation)": eyes_of(packaged, own, left_out),
             "random gaze by gaze_conversation": random_eyes(own.duration_s, HEAD_FPS, **far_chance, blinks=17, seed=left_out),
         }
         # what was not learned from averaged gaze is averaged as the recordings were

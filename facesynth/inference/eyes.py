@@ -66,17 +66,21 @@ class Eyes:
         still = at_rest(self.layout, int(speech.phones.frame_bounds(self.fps)[-1]), self.fps)
         return self.look(still, seed=seed, phones=speech.phones)
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
         """The motion with these eyes, at its own rate, and with a head that follows their wide shifts.
 
         The eyes undo a share of the head's quick turns and all of the turns that follow them. A motion without a head gets
         one where there are wide shifts; a head of zeros turns as well. With phones, eyes listen where nobody speaks for long.
+        turning: whether the head may follow; where it may not, it stays as it is and the eyes alone make the whole shift.
         """
         frames = self.grow(len(motion) / motion.fps, seed, phones).frames
-        grown, turns = self._at_times(frames, motion), self._at_times(head_turns(frames[:, 1:], self.fps), motion)
+        wide = head_turns(frames[:, 1:], self.fps) if turning else np.zeros((len(frames), 2))
+        grown, turns = self._at_times(frames, motion), self._at_times(wide, motion)
         head = np.zeros((len(motion), 6), np.float32) if motion.head is None else motion.head
         gaze = grown[:, 1:] - self.parts.compensation * quick_turns(head, motion.fps) - turns
         eyes = np.concatenate([np.clip(grown[:, :1], 0, 1), within_reach(gaze)], axis=1)
+        if not turning:
+            return replace(motion, eyes=eyes.astype(np.float32))
         head = head + np.pad(np.stack([-turns[:, 1], turns[:, 0]], axis=1), ((0, 0), (0, 4)))
         return replace(motion, eyes=eyes.astype(np.float32), head=head.astype(np.float32))
 

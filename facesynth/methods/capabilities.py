@@ -108,8 +108,8 @@ class MappingEmotions(Protocol):
 class Looking(Protocol):
     """Moves eyes that know of the head."""
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
-        """The motion with eyes that go with its head, which may turn further where the eyes look far, and with what is said."""
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
+        """The motion with eyes that go with its head and with what is said; the head turns with wide looks, if it may."""
         ...
 
 

@@ -103,7 +103,8 @@ class Preview:
         key = (hash(speech.audio.tobytes()), speech.duration_s, fps, asked.seed, asked.head, asked.eyes)
         if self._beside is None or self._beside[0] != key:
             count = max(round(speech.duration_s * fps), 1)
-            still = Motion(np.zeros((count, 1), np.float32), fps, STILL)
+            layout = self.stage.as_arkit(mouth).layout
+            still = Motion(np.zeros((count, layout.channels), np.float32), fps, layout)
             if mouth.head is not None or mouth.eyes is not None:
                 still = _at_rate(now.draft.motion(), fps, count)
             face = whole_face(self.cast, still, speech, asked)

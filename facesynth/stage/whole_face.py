@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.face.behaviour.eyes import EyeMotion, still_eyes
+from facesynth.face.rig.arkit import shows_gaze
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack, Speech
@@ -39,8 +40,12 @@ def whole_face(cast: Cast, motion: Motion, speech: Speech, request: Request) -> 
     sources = {"mouth": described(cast.mouth)}
     if cast.expression is not None:
         sources["expression"] = described(cast.expression)
+    follows = _head_may_follow(cast, motion, request)
     motion, sources["head"] = _with_head(cast, motion, speech, request)
     motion, eyes, sources["eyes"] = _with_eyes(cast, motion, speech, request)
+    if follows and eyes is packaged_eyes:
+        motion, eyes = _head_led_by_eyes(motion, speech, request)
+        sources["head"] += ", and with wide shifts of the gaze"
     return WholeFace(motion, eyes, sources)
 
 
@@ -82,8 +87,20 @@ def _looking(cast: Cast, eyes: TrainedModel, motion: Motion, speech: Speech, req
     if (looking := ask(eyes, Looking)) is None:
         own = cast.options(request, speech.phones, eyes)
         return replace(motion, eyes=at_clock(eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
-    looked = looking.look(motion, seed=request.seed, phones=speech.phones)
-    return replace(looked, head=motion.head) if request.head.source == "off" else looked
+    return looking.look(motion, seed=request.seed, phones=speech.phones, turning=request.head.factor > 0)
+
+
+def _head_may_follow(cast: Cast, motion: Motion, request: Request) -> bool:
+    """Whether the package's head moves, which follows the package's eyes; any other is left to whoever moves it."""
+    packaged = cast.head is None and motion.head is None and request.head.source == "default"
+    return packaged and len(motion) > 0 and min(request.head.gain, request.eyes.gain) > 0 and not shows_gaze(motion.layout)
+
+
+def _head_led_by_eyes(motion: Motion, speech: Speech, request: Request) -> tuple[Motion, EyeMotion]:
+    """The package's head, which follows the wide shifts of the package's eyes, and these eyes as an `EyeMotion`."""
+    looked = _packaged().look(motion, seed=request.seed, phones=speech.phones)
+    eyes = np.asarray(looked.eyes, np.float64)
+    return replace(motion, head=looked.head), lambda *_: eyes
 
 
 def _account(model: TrainedModel, speech: Speech, request: Request) -> str:
@@ -94,9 +111,9 @@ def _account(model: TrainedModel, speech: Speech, request: Request) -> str:
 
 
 def packaged_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
-    """An `EyeMotion` of the model that comes with the package."""
+    """An `EyeMotion` of the model that comes with the package, beside a head that does not follow it."""
     still = Motion(np.zeros((len(head), 1), np.float32), fps, Layout("curves", ("still",)), head.astype(np.float32))
-    eyes = _packaged().look(still, seed=seed, phones=phones).eyes
+    eyes = _packaged().look(still, seed=seed, phones=phones, turning=False).eyes
     return np.zeros((0, 3)) if eyes is None else eyes.astype(np.float64)
 
 

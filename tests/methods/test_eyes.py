@@ -7,7 +7,7 @@ from living_eyes import FPS, learnt, recording, with_eyes
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.eyes import at_rest
-from facesynth.inference.gaze import REACH_RAD
+from facesynth.inference.gaze import REACH_RAD, facing
 from facesynth.inference.motion import Motion
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.patch_size import knee, patch_size
@@ -87,6 +87,19 @@ def test_wide_shifts_turn_the_head_and_narrow_ones_do_not():
     assert not made.head[:, 3:].any()
     near = learnt(Motion(wide.frames, FPS, wide.layout, None, wide.eyes * (1, 0.2, 0.2)), patch_s=0.5)
     assert not near.look(at_rest(tiny_layout(), 1800, FPS)).head.any()
+
+
+def test_where_somebody_looks_is_the_same_whether_the_head_may_follow_or_not():
+    wide = recording()
+    far = learnt(Motion(wide.frames, FPS, wide.layout, None, wide.eyes * (1, 2, 2)))
+    still = at_rest(tiny_layout(), 1800, FPS)
+    followed, held = far.look(still), far.look(still, turning=False)
+    assert held.head is None
+    assert np.degrees(np.abs(followed.head[:, 1])).max() > 2
+    within = np.hypot(*(held.eyes[:, 1:] / REACH_RAD).T) < 0.99
+    within &= np.hypot(*(followed.eyes[:, 1:] / REACH_RAD).T) < 0.99
+    assert within.mean() > 0.5
+    assert (followed.eyes[:, 1:] + facing(followed.head))[within] == pytest.approx(held.eyes[:, 1:][within], abs=1e-5)
 
 
 def test_eyes_stay_what_eyes_can_be():

@@ -9,6 +9,7 @@ from living_eyes import learnt, recording
 
 from facesynth.face.behaviour.eyes import still_eyes
 from facesynth.inference.eyes import at_rest
+from facesynth.inference.layout import Layout
 from facesynth.stage.cast import Cast
 from facesynth.stage.request import Part, Request
 from facesynth.stage.whole_face import EYES, HEAD, packaged_eyes, whole_face
@@ -63,13 +64,29 @@ def test_a_part_that_is_off_is_still_whoever_else_moves(motion, speech, eyes):
 
 def test_what_nobody_recorded_is_named_as_what_it_is(motion, speech):
     made = face(motion, speech)
-    assert made.eyes is packaged_eyes
     assert "constants" in made.sources["head"] or "package" in made.sources["head"]
     assert "package" in made.sources["eyes"]
     still = face(motion, speech, head=Part("recorded"), eyes=Part("recorded"))
     assert still.motion.head is None
     assert still.eyes is still_eyes
     assert "still" in still.sources["head"]
+
+
+def test_the_packages_head_follows_the_packages_eyes_and_no_other_does(speech):
+    motion = at_rest(tiny_layout(), 120 * 60, 60.0)
+    followed, alone = face(motion, speech), face(motion, speech, eyes=Part("off"))
+    assert np.degrees(np.abs(followed.motion.head - alone.motion.head)[:, 1]).max() > 3
+    for held in ({"head": Part("off")}, {"head": Part("recorded")}, {"head": Part(gain=0.0)}):
+        assert face(motion, speech, **held).eyes is packaged_eyes
+    own = replace(motion, head=np.full((len(motion), 6), 0.01, np.float32))
+    assert np.array_equal(face(own, speech).motion.head, own.head)
+    curves = at_rest(Layout("curves", ("jawOpen", "eyeLookInLeft")), 60, 60.0)
+    assert face(curves, speech).eyes is packaged_eyes, "these show where they look"
+
+
+def test_eyes_beside_a_head_that_is_held_make_the_whole_shift(motion, speech, eyes):
+    made = face(motion, speech, eyes, head=Part("off"))
+    assert made.motion.eyes == pytest.approx(eyes.look(replace(motion, head=None), turning=False).eyes, abs=1e-6)
 
 
 def test_the_packages_eyes_live_and_say_from_whom_they_are():

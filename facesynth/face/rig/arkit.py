@@ -20,6 +20,11 @@ def arkit_columns(layout: Layout) -> dict[str, int]:
     return {name: columns[name] for name in ARKIT_NAMES if name in columns}
 
 
+def shows_gaze(layout: Layout) -> bool:
+    """Whether curves say where the left eye looks."""
+    return any(f"eyeLook{way}Left" in arkit_columns(layout) for way in ("In", "Out", "Up", "Down"))
+
+
 def gaze_of(weights: ArrayLike) -> NDArray[np.float64]:
     """[T, 2] gaze (rad, to the performer's left and up) that the eyeLook weights [T, 52] stand for: the mean of both eyes."""
     look = dict(zip(ARKIT_NAMES, np.asarray(weights, np.float64).T, strict=True))

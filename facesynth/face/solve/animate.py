@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import EyeMotion, quiet_eyes
-from facesynth.face.rig.arkit import BLINKS, arkit_columns, gaze_of, gaze_weights
+from facesynth.face.rig.arkit import BLINKS, arkit_columns, gaze_of, gaze_weights, shows_gaze
 from facesynth.face.rig.arkit_rig import PIVOT_MM, Rig
 from facesynth.face.rig.markers import MIDDLE_LIPS, LipGap, marker_vertices
 from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
@@ -205,8 +205,7 @@ def _gaze(motion: Motion, made: NDArray[np.float64]) -> NDArray[np.float64]:
     """[T, 2] the motion's own gaze where it has one, else the one that was made for it."""
     if motion.eyes is not None:
         return motion.eyes[:, 1:].astype(np.float64)
-    curves = {f"eyeLook{way}Left" for way in ("In", "Out", "Up", "Down")} & set(motion.layout.names)
-    return gaze_of(_curves(motion)) if curves else made[:, 1:]
+    return gaze_of(_curves(motion)) if shows_gaze(motion.layout) else made[:, 1:]
 
 
 def _lids(motion: Motion, weights: NDArray[np.float64], made: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -141,9 +141,9 @@ class Eyes(Method):
         self.refuse(options)
         return self.runtime().synthesize(speech, seed=seed)
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
         """The motion with eyes that go with its head, which wide shifts turn; they listen where nobody speaks for long."""
-        return self.runtime().look(motion, seed=seed, phones=phones)
+        return self.runtime().look(motion, seed=seed, phones=phones, turning=turning)
 
     def account(self, speech: Speech, *, seed: int = 0, **options: Any) -> Account:
         """How often nothing that was recorded fitted."""
