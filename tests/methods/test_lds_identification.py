@@ -22,7 +22,7 @@ def median_errors(frames, rows, seeds=10):
     return np.median([errors(t := random_truth(seed), [recording(t, frames, seed + 100)], rows) for seed in range(seeds)], axis=0)
 
 
-@pytest.mark.parametrize(("frames", "rows"), [(1_000, 10), (10_000, 15)])
+@pytest.mark.parametrize(("frames", "rows"), [(1_000, 10), pytest.param(10_000, 15, marks=pytest.mark.slow)])
 def test_simulated_systems_are_found(frames, rows):
     assert (median_errors(frames, rows) < 1.5 * np.array(REACHED[frames])).all()
 

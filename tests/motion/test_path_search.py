@@ -353,7 +353,7 @@ def searched(count, soft):
     return largest.numbers, sum(kept.values())
 
 
-@pytest.mark.parametrize("soft", [False, True])
+@pytest.mark.parametrize("soft", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_memory_grows_with_the_nodes_and_not_with_their_square(soft, monkeypatch):
     monkeypatch.setattr(steps, "ON_PROCESSOR", 4000)
     monkeypatch.setattr(pruning, "FEW", 0)

@@ -12,8 +12,8 @@ export function make(tag, properties = {}, ...children) {
   return element;
 }
 
-/** Of a field whose value is in nothing but the field until a button is pressed. */
-export const DRAFT = { "data-draft": "" };
+/** Properties of a field whose value is nowhere but in it until a button is pressed; `value` is what it begins with. */
+export const draft = (value) => ({ "data-draft": String(value) });
 
 export const labelled = (text, field) => make("label", {}, `${text} `, field);
 
@@ -24,10 +24,10 @@ export function choice(options, value, properties = {}) {
   return select;
 }
 
-/** Put children in place: the focus goes back to what has the same id, and fields of DRAFT keep what was put into them. */
+/** Put children in place: the focus goes back to what has the same id, and what a person put into a `draft` stays. */
 export function refill(parent, ...children) {
   const focused = parent.contains(document.activeElement) ? document.activeElement.id : "";
-  const drafts = [...parent.querySelectorAll("[data-draft]")].map((field) => [field.id, field.value]);
+  const drafts = [...parent.querySelectorAll("[data-draft]")].filter((field) => field.value !== field.dataset.draft).map((field) => [field.id, field.value]);
   parent.replaceChildren(...children);
   for (const [id, value] of drafts) keep(document.getElementById(id), value);
   if (focused) document.getElementById(focused)?.focus();

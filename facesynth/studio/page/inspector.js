@@ -3,7 +3,7 @@
 import { store, watch, changed, currentTake, change, changeTake, isDoubted, startOf, regionStart, say } from "/page/store.js";
 import { ask } from "/page/link.js";
 import * as sound from "/page/sound.js";
-import { make, labelled, choice, refill, DRAFT } from "/page/dom.js";
+import { make, labelled, choice, refill, draft } from "/page/dom.js";
 import { qualityOf } from "/page/lanes.js";
 import { choosePhone } from "/page/timeline.js";
 import { lookAt } from "/page/map.js";
@@ -147,10 +147,10 @@ function showEmotion(take) {
 function painting(take, emotions) {
   const words = take.words.length ? take.words.map(([label, start], n) => [n, `${label} (${start.toFixed(2)} s)`]) : take.phones.map(([label], n) => [n, `${label} ${n}`]);
   const span = (n) => (take.words.length ? [take.words[n][1], take.words[n][2]] : [startOf(take, n), take.phones[n][1]]);
-  const from = choice(words, 0, { id: "paint-from", ...DRAFT });
-  const to = choice(words, words.length - 1, { id: "paint-to", ...DRAFT });
-  const emotion = choice(emotions, emotions[0], { id: "paint-emotion", ...DRAFT });
-  const strength = make("input", { id: "paint-intensity", ...DRAFT, type: "number", min: 0, max: 1, step: 0.05, value: 1 });
+  const from = choice(words, 0, { id: "paint-from", ...draft(0) });
+  const to = choice(words, words.length - 1, { id: "paint-to", ...draft(words.length - 1) });
+  const emotion = choice(emotions, emotions[0], { id: "paint-emotion", ...draft(emotions[0]) });
+  const strength = make("input", { id: "paint-intensity", ...draft(1), type: "number", min: 0, max: 1, step: 0.05, value: 1 });
   const paint = () => changeTake("paint_emotion", { start_s: span(Number(from.value))[0], end_s: span(Number(to.value))[1], emotion: emotion.value, intensity: Number(strength.value) });
   return [make("h3", { textContent: "A new region" }),
     make("div", { className: "row" }, labelled("from", from), labelled("to", to), labelled("felt", emotion), labelled("intensity", strength),
@@ -167,7 +167,7 @@ function curveRows(take) {
   const rows = take.curve.map(([time, value], n) => make("tr", {}, make("td", { textContent: `${time.toFixed(3)} s` }), make("td", { textContent: `${Math.round(100 * value)} %` }),
     make("td", {}, make("button", { textContent: "Remove", "aria-label": `Remove the point at ${time.toFixed(3)} s`, onclick: () => changeTake("set_curve", { points: take.curve.filter((_, i) => i !== n) }) }))));
   return [make("h3", { textContent: "Intensity over time (times that of each region)" }),
-    make("div", { className: "row" }, labelled("value", make("input", { id: "curve-value", ...DRAFT, type: "number", min: 0, max: 1, step: 0.05, value: 0.5 })),
+    make("div", { className: "row" }, labelled("value", make("input", { id: "curve-value", ...draft(0.5), type: "number", min: 0, max: 1, step: 0.05, value: 0.5 })),
       make("button", { id: "curve-put", textContent: "Put a point at the playhead", onclick: put }),
       make("button", { id: "curve-clear", textContent: "No curve", disabled: !take.curve.length, onclick: () => changeTake("set_curve", { points: [] }) })),
     make("table", {}, make("tbody", {}, ...rows))];

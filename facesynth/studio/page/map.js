@@ -3,7 +3,7 @@
 import { ask, on, lastNumber } from "/page/link.js";
 import { store, watch, changed, currentTake, change, changeTake, startOf, motionOf, seen, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
-import { make, labelled, choice, refill } from "/page/dom.js";
+import { make, labelled, choice, refill, draft } from "/page/dom.js";
 import { phoneUnder } from "/page/timeline.js";
 import { path, bitmapOf, paintMarks } from "/page/map_paint.js";
 import * as recording from "/page/recording.js";
@@ -348,9 +348,10 @@ function startDrawing() {
 }
 
 function drawTools(button) {
-  const title = make("input", { id: "draw-title", value: `my ${map.phone}`, size: 8 });
-  const length = make("input", { id: "draw-length", type: "number", min: 0.02, max: 2, step: 0.01, value: phoneLength().toFixed(2) });
-  const emotion = choice(store.model.emotions, currentTake()?.emotions[store.region]?.[0] ?? store.model.emotions[0], { id: "draw-emotion" });
+  const [name, lasts, felt] = [`my ${map.phone}`, phoneLength().toFixed(2), currentTake()?.emotions[store.region]?.[0] ?? store.model.emotions[0]];
+  const title = make("input", { id: "draw-title", ...draft(name), value: name, size: 8 });
+  const length = make("input", { id: "draw-length", ...draft(lasts), type: "number", min: 0.02, max: 2, step: 0.01, value: lasts });
+  const emotion = choice(store.model.emotions, felt, { id: "draw-emotion", ...draft(felt) });
   const facts = () => ({ title: title.value, emotion: emotion.value, duration_s: Number(length.value) });
   const none = drawing.length < 2;
   return [labelled("Name", title), labelled("length, s", length), labelled("felt", emotion),
