@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+"""One thread to a test process, before anything opens more: threads of two processes that wait for the same two cores spin, and
+the small networks of these tests then take six times the processor time."""
+
 RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
