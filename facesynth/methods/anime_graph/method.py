@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 from torch import nn
 
 from facesynth.corpus import Corpus
@@ -172,13 +173,16 @@ class AnimeGraph(Method):
         pairs = list(permutations(self.emotions, 2))
         counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
         self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
-        for pair in track(pairs, "emotion maps"):
-            try:
-                require_pairs(self.split, counts[pair], *pair)
-            except FacesynthError as error:
-                self.facts["no_map"][" ".join(pair)] = str(error)
-            else:
-                fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
+        # Hundreds of small clusterings and systems: where another program held one of two processors, two threads that
+        # wait for each other took 55 s of processor time for a fit that takes 6 s with one thread here.
+        with threadpool_limits(1):
+            for pair in track(pairs, "emotion maps"):
+                try:
+                    require_pairs(self.split, counts[pair], *pair)
+                except FacesynthError as error:
+                    self.facts["no_map"][" ".join(pair)] = str(error)
+                else:
+                    fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
         self.maps.fill(fitted, self.split.emotional)
 
     def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:
