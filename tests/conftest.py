@@ -2,6 +2,8 @@
 
 import importlib.util
 import os
+import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,18 @@ def pytest_collection_modifyitems(items):
 def repository() -> Path:
     """The checkout: configs, train and export lie beside the package."""
     return Path(__file__).parents[1]
+
+
+@pytest.fixture
+def script(monkeypatch, capsys, repository):
+    """A function that does what `python train/NAME ARGUMENTS` does, in this process; gives what was printed."""
+
+    def run(name: str, *arguments) -> str:
+        monkeypatch.setattr(sys, "argv", [str(repository / "train" / name), *map(str, arguments)])
+        runpy.run_path(sys.argv[0], run_name="__main__")
+        return capsys.readouterr().out
+
+    return run
 
 
 @pytest.fixture(scope="session")

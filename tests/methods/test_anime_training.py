@@ -1,6 +1,3 @@
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,15 +9,6 @@ from facesynth.methods.emotion.detector import DetectorSettings, EmotionDetector
 from facesynth.methods.registry import load
 
 ROOT = Path(__file__).parents[2]
-
-
-def run(script, *arguments):
-    finished = subprocess.run(
-        [sys.executable, str(ROOT / "train" / script), *map(str, arguments)],
-        capture_output=True, text=True, check=False, cwd=arguments[0].parent, env=os.environ,
-    )  # fmt: skip
-    assert finished.returncode == 0, finished.stderr
-    return finished.stdout
 
 
 @pytest.fixture(scope="module")
@@ -37,18 +25,18 @@ def test_configs_name_only_known_settings():
     assert DetectorSettings.from_config(load_config(ROOT / "configs" / "emotion_paper.yaml")).features == "paper"
 
 
-def test_training_the_anime_graph(corpus, tmp_path):
+def test_training_the_anime_graph(corpus, tmp_path, script):
     model = tmp_path / "graph.safetensors"
-    said = run("anime_graph.py", corpus.path, "-o", model, "--maps", "5", "map_centres=30")
+    said = script("anime_graph.py", corpus.path, "-o", model, "--maps", "5", "map_centres=30")
     assert "jumps in" in said
     assert "neutral to happy, each of 3 sentences left out" in said
     assert "needs at least 3 sentences" in said
     assert load(model).name == "anime_graph"
 
 
-def test_training_the_detector(corpus, tmp_path):
+def test_training_the_detector(corpus, tmp_path, script):
     detector = tmp_path / "emotion.safetensors"
-    said = run("emotion.py", corpus.path, "-o", detector)
+    said = script("emotion.py", corpus.path, "-o", detector)
     assert "by sentence" in said
     utterance = next(iter(corpus))
     assert EmotionDetector.load(detector).detect(utterance.speech.audio, 16000).emotion in corpus.emotions

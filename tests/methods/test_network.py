@@ -1,10 +1,5 @@
 """The network of poses: what it learns, that it looks no further than it says, that streams and folders give the same."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -25,7 +20,6 @@ from facesynth.methods.learn.windows import Batch
 from facesynth.methods.network.method import Network
 from facesynth.methods.registry import create, load
 
-ROOT = Path(__file__).parents[2]
 RNG = np.random.default_rng(3)
 
 
@@ -181,16 +175,11 @@ def test_the_deviations_say_how_sure_a_pose_is(halves):
     assert 0 < deviations.mean() < 1
 
 
-def test_the_script_that_shows_the_loop_learns_what_fit_learns(halves, tmp_path, monkeypatch):
+def test_the_script_that_shows_the_loop_learns_what_fit_learns(halves, tmp_path, script):
     corpus = halves[0].path
-    made = subprocess.run(
-        [sys.executable, ROOT / "train" / "network.py", corpus, "-o", tmp_path / "shown.safetensors", "--steps", "2"],
-        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": f"{ROOT}"}, check=False,
-    )  # fmt: skip
-    assert made.returncode == 0, made.stderr
+    said = script("network.py", corpus, "-o", tmp_path / "shown.safetensors", "--steps", "2")
     recorded, held_out = facesynth.Corpus.open(corpus).split(0)
-    monkeypatch.setattr(windows, "BATCH", 16)
     fitted, shown = Network(steps=2).fit(recorded), load(tmp_path / "shown.safetensors")
     speech = held_out[held_out.ids[0]].speech
     np.testing.assert_allclose(shown.synthesize(speech).frames, fitted.synthesize(speech).frames, atol=1e-5)
-    assert "held out: lips" in made.stdout
+    assert "held out: lips" in said
