@@ -164,6 +164,11 @@ def _motion(phones: PhoneTrack, emotion: str, fps: float, rng: np.random.Generat
     )
 
 
+def label_lines(phones):
+    """A track of phones as lines of `end label`."""
+    return "".join(f"{end_s:.6f} {label}\n" for label, end_s in zip(phones.labels, phones.ends_s, strict=True))
+
+
 def twin_corpus(path, emotions=("neutral", "happy", "sad"), sentences=8, *, fps=60, shift=None):
     """Sentences of the tiny performer in each of the emotions, with the same phones at other times."""
     layout = tiny_layout()

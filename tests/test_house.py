@@ -1,6 +1,7 @@
 """The direction of the arrows: rooms import down only, and no private names of each other."""
 
 import ast
+import functools
 import itertools
 import re
 import subprocess
@@ -34,8 +35,15 @@ BELOW = {
 """What a room may import; the command line may import everything."""
 
 
+@functools.cache
+def import_statements(path):
+    """Those of a file, wherever they stand in it."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imports(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("facesynth."):
             yield node.module.split("."), [alias.name for alias in node.names]
 
@@ -144,7 +152,7 @@ def test_importing_facesynth_imports_nothing_heavy_and_offers_everything():
 
 def test_nothing_imports_gpl_packages():
     for path in ROOT.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in import_statements(path):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "") or ""]
             assert not {name.split(".")[0] for name in names} & {"piper", "parselmouth", "espeakng_loader"}, path
 
@@ -154,7 +162,7 @@ def test_inference_imports_numpy_and_onnxruntime_alone():
     allowed = {"numpy", "onnxruntime", *sys.stdlib_module_names}
     for path in (ROOT / "inference").rglob("*.py"):
         depth = len(path.relative_to(ROOT / "inference").parts)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in import_statements(path):
             if isinstance(node, ast.Import):
                 strangers = {alias.name.split(".")[0] for alias in node.names} - allowed
                 assert not strangers, f"{path.relative_to(ROOT)} imports {sorted(strangers)}"
@@ -228,8 +236,13 @@ def declared():
 @pytest.mark.parametrize("distribution", declared())
 def test_what_is_declared_is_used(distribution):
     wanted = IMPORTED_AS.get(distribution, distribution).replace("-", "_")
-    used = {name for path in ROOT.rglob("*.py") for name in imported_packages(path)}
-    assert wanted in used, f"{distribution} is declared in pyproject.toml and imported nowhere; use it or leave it out"
+    assert wanted in all_imported(), f"{distribution} is declared in pyproject.toml and imported nowhere; use it or leave it out"
+
+
+@functools.cache
+def all_imported():
+    """Packages that any file of facesynth imports."""
+    return {name for path in ROOT.rglob("*.py") for name in imported_packages(path)}
 
 
 def imported_packages(path):

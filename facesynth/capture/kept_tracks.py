@@ -9,6 +9,7 @@ from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
 from facesynth.capture.models import MODELS
 from facesynth.capture.track import Track, track_face
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
 
@@ -31,10 +32,8 @@ def kept_track(path: str | Path, face: int | None = None) -> Track:
 
 
 def _place(path: Path, face: int | None) -> Path:
-    with open(path, "rb") as file:
-        content = hashlib.file_digest(file, "sha256").hexdigest()
     made_by = hashlib.sha256("".join([str(VERSION), str(face), *(model.sha256 for model in MODELS.values())]).encode())
-    return cache_dir("tracks") / f"{content[:32]}-{made_by.hexdigest()[:8]}.npz"
+    return cache_dir("tracks") / f"{hash_file(path)[:32]}-{made_by.hexdigest()[:8]}.npz"
 
 
 def _read(kept: Path) -> Track | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections import Counter
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.corpus_edit import edit
+from facesynth.cli.corpus_edit import edit, show
 from facesynth.cli.followed_points import Followed, keep_videos_of, points_followed, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
 from facesynth.cli.transcriber import chosen_transcriber
@@ -90,7 +89,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
         "channels": corpus.layout.channels,
         "emotions": corpus.emotions,
     }
-    _show(
+    show(
         as_json,
         facts,
         [f"{folder} is a corpus of {corpus.performer}; add recordings with `facesynth corpus add {folder} FILES…`"],
@@ -168,7 +167,7 @@ def add(
     with cut_for(sound, files) as cuts:
         report = add_recordings(corpus, (*files, *cuts.sounds), known, listed=listed, texts=texts, workers=workers, **given)
     keep_videos_of(corpus, files, report, utterance_id)
-    _show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_summary(corpus, report)])
+    show(as_json, {**asdict(report), "guessed": guessed}, [*guessed, *cuts.remarks, *_summary(corpus, report)])
     done = report.added or report.changed or report.kept or report.unchanged
     _leave_if_nothing(not done, report.refused, "no recording was added")
 
@@ -193,7 +192,7 @@ def convert(files: tuple[Path, ...], folder: Path, said: Said, as_json: bool) ->
     if report.converted:
         lines.append(f"make their corpus with `facesynth corpus new NAME --layout {folder / LAYOUT} --fps {report.fps:g} …`")
     lines += report.guessed
-    _show(as_json, asdict(report), [*lines, *_listing("not converted", report.refused), *_remarks(report.remarks)])
+    show(as_json, asdict(report), [*lines, *_listing("not converted", report.refused), *_remarks(report.remarks)])
     _leave_if_nothing(not report.converted, report.refused, "nothing was converted")
 
 
@@ -211,7 +210,7 @@ def align(folder: Path, ids: tuple[str, ...], force: bool, workers: Workers, as_
     report = align_corpus(Corpus.open(folder), ids or None, force, workers)
     lines = [f"aligned {len(report.aligned)}, kept {len(report.kept)}, failed {len(report.failed)}"]
     lines += [*_listing("kept", report.kept), *_listing("failed", report.failed), *_remarks(report.warnings)]
-    _show(as_json, asdict(report), lines)
+    show(as_json, asdict(report), lines)
     _leave_if_nothing(not report.aligned, report.failed, "no utterance was aligned")
 
 
@@ -226,7 +225,7 @@ def check(folder: Path, as_json: bool) -> None:
     problems = check_corpus(folder, needs())
     grave = sum(problem.grave for problem in problems)
     summary = f"{grave} problems, {len(problems) - grave} notes" if problems else "nothing is wrong"
-    _show(as_json, {"problems": [asdict(problem) for problem in problems]}, [*map(str, problems), summary])
+    show(as_json, {"problems": [asdict(problem) for problem in problems]}, [*map(str, problems), summary])
     if grave:
         sys.exit(2)
 
@@ -259,7 +258,7 @@ def stats(folder: Path, sentences: Path | None, count: int, pictures: Path | Non
         "would_add_most": [asdict(found) for found in wanted],
         "pictures": [str(path) for path in drawn],
     }
-    _show(as_json, facts, [*lines, *([f"{len(drawn)} pictures are in {pictures}"] if drawn else [])])
+    show(as_json, facts, [*lines, *([f"{len(drawn)} pictures are in {pictures}"] if drawn else [])])
 
 
 def _corpus_for(
@@ -347,10 +346,6 @@ def _read_text(path: Path) -> str:
         return " ".join(text_of(path).split())
     except (OSError, UnicodeDecodeError) as error:
         raise FacesynthError(f"{path} cannot be read as text ({error})") from None
-
-
-def _show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
-    click.echo(json.dumps(facts, ensure_ascii=False, indent=2) if as_json else "\n".join(lines))
 
 
 def _listing(what: str, reasons: Mapping[str, str]) -> list[str]:

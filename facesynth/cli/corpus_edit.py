@@ -42,7 +42,7 @@ def list_edits(folder: Path, as_json: bool) -> None:
     }
     lines = [f"{one.number:4d}  {_said(one)}{'' if one.number in force or one.op == 'undo' else ' (undone)'}" for one in edits]
     lines.append(f"{len(sum_.removed)} nodes are removed, {len(sum_.added)} drawn ones are in use")
-    _show(as_json, facts, lines)
+    show(as_json, facts, lines)
 
 
 @edit.command("remove")
@@ -57,7 +57,7 @@ def remove(folder: Path, nodes: tuple[str, ...], as_json: bool) -> None:
     names = _checked(corpus, nodes, removed=False)
     for name in names:
         corpus.remove_node(name)
-    _show(as_json, {"removed": names}, [f"removed {', '.join(names)}"])
+    show(as_json, {"removed": names}, [f"removed {', '.join(names)}"])
 
 
 @edit.command("restore")
@@ -72,7 +72,7 @@ def restore(folder: Path, nodes: tuple[str, ...], as_json: bool) -> None:
     names = _checked(corpus, nodes, removed=True)
     for name in names:
         corpus.restore_node(name)
-    _show(as_json, {"restored": names}, [f"restored {', '.join(names)}"])
+    show(as_json, {"restored": names}, [f"restored {', '.join(names)}"])
 
 
 @edit.command("add")
@@ -113,7 +113,7 @@ def add(
     else:
         raise FacesynthError("give --motion FILE, or --model, --path and --seconds together")
     node = add_motion(corpus, phone, emotion, new, title)
-    _show(as_json, {**_of_node(node), "remarks": list(new.remarks)}, [*new.remarks, f"added {node.name} ({phone}, {emotion})"])
+    show(as_json, {**_of_node(node), "remarks": list(new.remarks)}, [*new.remarks, f"added {node.name} ({phone}, {emotion})"])
 
 
 @edit.command("undo")
@@ -124,7 +124,7 @@ def undo(folder: Path, as_json: bool) -> None:
     from facesynth.corpus import Corpus
 
     taken = Corpus.open(folder).undo()
-    _show(as_json, {"undone": {"number": taken.number, **_plain(taken)}}, [f"undone: {_said(taken)}"])
+    show(as_json, {"undone": {"number": taken.number, **_plain(taken)}}, [f"undone: {_said(taken)}"])
 
 
 @edit.command("suspects")
@@ -142,7 +142,7 @@ def list_suspects(folder: Path, model: Path | None, most: int, as_json: bool) ->
     found = suspects(Corpus.open(folder), require(load(model), Browsing) if model else None)
     lines = [f"{one.node} ({one.phone}, {one.emotion}), {one.score:.1f}: {'; '.join(one.reasons)}" for one in found[:most]]
     lines.append(f"{len(found)} nodes are suspicious" if found else "no node is suspicious")
-    _show(as_json, {"suspects": [asdict(one) for one in found[:most]], "count": len(found)}, lines)
+    show(as_json, {"suspects": [asdict(one) for one in found[:most]], "count": len(found)}, lines)
 
 
 def _checked(corpus: Any, nodes: Iterable[str], *, removed: bool) -> list[str]:
@@ -174,5 +174,6 @@ def _said(one: "Edit") -> str:
     return f"undo {facts['of']}" if one.op == "undo" else f"{one.op} {facts['node']}"
 
 
-def _show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
+def show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
+    """Print what a verb found: all facts as JSON, or lines for people."""
     click.echo(json.dumps(facts, ensure_ascii=False, indent=2) if as_json else "\n".join(lines))

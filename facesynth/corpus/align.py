@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import Files
 from facesynth.corpus.record import Record
-from facesynth.corpus.signals import hash_file
 from facesynth.corpus.workers import ALONE, Workers, spread
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import load_audio
 from facesynth.speech.textgrid import write_textgrid

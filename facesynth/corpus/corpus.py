@@ -18,7 +18,6 @@ from facesynth.corpus.record import Record, read_records, write_records
 from facesynth.corpus.signals import (
     PARTS,
     Part,
-    hash_file,
     hash_signals,
     lost_parts,
     read_motion,
@@ -27,6 +26,7 @@ from facesynth.corpus.signals import (
 )
 from facesynth.corpus.splits import fold_ids, split_ids
 from facesynth.corpus.utterance import Utterance
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion

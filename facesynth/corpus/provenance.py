@@ -9,7 +9,7 @@ from facesynth.corpus.files import Files
 from facesynth.corpus.header import FORMAT, Header
 from facesynth.corpus.journal import Journal
 from facesynth.corpus.record import Record
-from facesynth.corpus.signals import hash_file
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 
 

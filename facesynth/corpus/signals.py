@@ -131,12 +131,6 @@ def hash_signals(audio: NDArray[np.float32], sample_rate: int, motion: Motion) -
     return digest.hexdigest()
 
 
-def hash_file(path: Path) -> str:
-    """sha256 of a file's bytes."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _write_emotions(path: Path, record: Record, emotions: EmotionTrack) -> None:
     """Write emotions/ID.csv where the record's one emotion does not say it all."""
     if emotions.labels == (record.emotion,) and float(emotions.intensities[0]) == record.intensity:

@@ -1,6 +1,5 @@
 """Writing an exported folder: graphs, arrays, manifest."""
 
-import hashlib
 import json
 import platform
 import shutil
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from facesynth import __version__
 from facesynth.export.graph import Graph, Parity, check_parity
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.folder import ARRAYS, CARD, FORMAT, MANIFEST, OPSET, digest
 from facesynth.inference.phones import PHONES, viseme_of
@@ -99,7 +99,7 @@ def _manifest(part: Path, subject: Subject, content: Content, parities: Mapping[
         "opset": OPSET,
         "versions": {name: version(name) for name in ("onnx", "onnxruntime", "numpy", "torch")}
         | {"facesynth": __version__, "python": platform.python_version()},
-        "files": {path.name: {"sha256": sha256_of(path), "bytes": path.stat().st_size} for path in files},
+        "files": {path.name: {"sha256": hash_file(path), "bytes": path.stat().st_size} for path in files},
         "graphs": {graph.name: _entry(graph, parities[graph.name]) for graph in content.graphs},
         "arrays": {
             name: {"dtype": str(a.dtype), "shape": list(a.shape), "unit": content.units.get(name, "none")}
@@ -126,9 +126,3 @@ def _entry(graph: Graph, parity: Parity) -> dict[str, Any]:
         "outputs": [port.to_dict() for port in graph.outputs],
         "parity": {"largest_relative_difference": parity.relative, "batch_and_length": [list(s) for s in parity.sizes]},
     }
-
-
-def sha256_of(path: Path) -> str:
-    """Of a file's bytes."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

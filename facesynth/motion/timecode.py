@@ -3,16 +3,6 @@
 import math
 
 
-def exact_fps(fps: float) -> float:
-    """23.976, 29.97, 59.94, … as the exact rate that they stand for, 24000/1001, 30000/1001, …; others unchanged.
-
-    >>> exact_fps(29.97) * 1001
-    30000.0
-    """
-    exact = math.ceil(fps) * 1000 / 1001
-    return exact if abs(fps - exact) < 0.002 else float(fps)
-
-
 def nominal_rate(fps: float) -> int:
     """Frames that a timecode counts in a second: 30 for 29.97, 24 for 23.976, 60 for 60."""
     return math.ceil(fps - 1e-6)

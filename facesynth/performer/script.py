@@ -9,20 +9,13 @@ from itertools import pairwise
 from typing import Literal
 
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.inference.phones import BILABIALS, LABIODENTALS, SILENCE
+from facesynth.inference.phones import SILENCE
 from facesynth.speech.phone_labels import normalise_phone
 
 Size = Literal["small", "full"]
 SIZES: tuple[Size, ...] = ("small", "full")
 SMALL = 20
 """Sentences of the small script: the first of the full one."""
-
-PHONE_WORTH = 8.0
-"""A phone not yet heard counts like this many new diphones."""
-LIP_WORTH = 0.4
-"""Share of a new diphone that each p, b, m, f, v counts, new or not: lips are what a viewer watches."""
-PAUSE_PHONES = 6
-"""The silence around a sentence costs as much time as this many phones."""
 
 
 @dataclass(frozen=True)
@@ -62,29 +55,6 @@ def phones_of(text: str) -> tuple[str, ...]:
 def diphones_of(phones: Sequence[str]) -> set[tuple[str, str]]:
     """Pairs of neighbouring phones."""
     return set(pairwise(phones))
-
-
-def greedy_order(texts: Sequence[str]) -> list[str]:
-    """Order sentences so that each next one adds the most new sounds for its length.
-
-    Worth of a sentence = new diphones + 8 x new phones + 0.4 x lip consonants, over its phones and pauses. The optimum
-    is a set-cover problem; the greedy choice is within a factor of ln(diphones) of it. Ties go to the alphabet.
-    """
-    phones = {text: phones_of(text) for text in sorted(set(texts))}
-    order: list[str] = []
-    heard: set[tuple[str, str]] = set()
-    while phones:
-        best = max(phones, key=lambda text: _worth(phones[text], heard))
-        heard |= diphones_of(phones.pop(best))
-        order.append(best)
-    return order
-
-
-def _worth(phones: Sequence[str], heard: set[tuple[str, str]]) -> float:
-    new_diphones = len(diphones_of(phones) - heard)
-    new_phones = len(set(phones) - {phone for pair in heard for phone in pair})
-    lips = sum(phone in BILABIALS | LABIODENTALS for phone in phones)
-    return (new_diphones + PHONE_WORTH * new_phones + LIP_WORTH * lips) / (len(phones) + PAUSE_PHONES)
 
 
 @cache

@@ -32,12 +32,5 @@ def write_truth(corpus_path: str | Path, truth: Mapping[str, Sequence[Fault]]) -
     write_text(Path(corpus_path) / FILE, "{\n" + ",\n".join(lines) + "\n}\n")
 
 
-def contaminated_nodes(truth: Mapping[str, Sequence[Fault]]) -> frozenset[str]:
-    """Names of the nodes (`utterance_id:phone_number`) whose markers were confused or knocked."""
-    return frozenset(
-        f"{utterance}:{fault.phone}" for utterance, faults in truth.items() for fault in faults if fault.phone is not None
-    )
-
-
 def _fault(plain: Mapping[str, Any]) -> Fault:
     return Fault(plain["kind"], tuple(plain["markers"]), plain["start"], plain["stop"], plain["phone"])

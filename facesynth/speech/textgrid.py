@@ -113,11 +113,6 @@ def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment
     write_text(path, "\n".join(lines) + "\n")
 
 
-def read_label_lines(path: str | Path) -> PhoneTrack:
-    """Phones from lines of `end label` or `start end label`, times in seconds; empty lines and `#` comments are passed over."""
-    return _from_lines(Path(path), None).phones
-
-
 def _from_lines(path: Path, duration_s: float | None) -> Labelled:
     segments, encoding = _line_segments(path)
     segments, counted = _in_seconds(segments, duration_s)
@@ -208,11 +203,6 @@ def _without_gaps(segments: Iterable[Segment], end_s: float) -> Iterator[Segment
 def _number(seconds: float) -> str:
     """The shortest digits that give the same number back."""
     return f"{seconds:.0f}" if abs(seconds - int(seconds)) <= 1e-14 * abs(seconds) else repr(float(seconds))
-
-
-def write_label_lines(path: str | Path, phones: PhoneTrack) -> None:
-    """Write one `end label` a line, seconds, atomically."""
-    write_text(path, "".join(f"{end_s:.6f} {label}\n" for label, _, end_s in segments_of(phones)))
 
 
 def is_silence_mark(word: str) -> bool:

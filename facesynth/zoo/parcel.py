@@ -1,6 +1,5 @@
 """A model in one file, to be carried to another place: a ZIP of its folder, checked before anything in it is used."""
 
-import hashlib
 import re
 import shutil
 import tempfile
@@ -11,6 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from facesynth.atomic import atomic_path
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.folder import CARD, MANIFEST, open_folder
 from facesynth.progress import track
@@ -32,7 +32,7 @@ def push(folder: Path, to: Path) -> tuple[Path, str]:
     with atomic_path(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as parcel:
         for name in sorted([*open_folder(folder).contents, MANIFEST, CARD]):
             parcel.writestr(zipfile.ZipInfo(name, _MOMENT), (folder / name).read_bytes(), zipfile.ZIP_DEFLATED)
-    return target, _sha256(target)
+    return target, hash_file(target)
 
 
 def pull(source: str, *, sha256: str | None = None) -> Entry:
@@ -45,7 +45,7 @@ def pull(source: str, *, sha256: str | None = None) -> Entry:
         parcel = _fetched(source, Path(temporary)) if _is_url(source) else Path(source)
         if not parcel.is_file():
             raise FacesynthError(f"{parcel}: no such file; wanted a parcel NAME{SUFFIX} that `facesynth push` wrote, or its URL")
-        if sha256 is not None and (got := _sha256(parcel)) != sha256.lower():
+        if sha256 is not None and (got := hash_file(parcel)) != sha256.lower():
             raise FacesynthError(
                 f"{source} has the sha256 {got}; wanted {sha256}: it was changed or is another one, and is not used"
             )
@@ -113,8 +113,3 @@ def _fetched(url: str, folder: Path) -> Path:
     if stated and target.stat().st_size != stated:
         raise FacesynthError(f"{url} broke off at {target.stat().st_size} of {stated} bytes; fetch it again")
     return target
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

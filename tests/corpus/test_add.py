@@ -3,7 +3,7 @@ import shutil
 
 import numpy as np
 import pytest
-from corpora import EMOTIONS, tiny_layout, tiny_utterances
+from corpora import EMOTIONS, label_lines, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.add.add import add, find_recordings
@@ -13,7 +13,7 @@ from facesynth.corpus.checks.check import check
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.pose import apply_head, rigid_points
 from facesynth.speech.audio import load_audio, save_wav
-from facesynth.speech.textgrid import write_label_lines, write_textgrid
+from facesynth.speech.textgrid import write_textgrid
 
 NEUTRAL = np.reshape(tiny_layout().neutral, (-1, 3))
 
@@ -109,7 +109,7 @@ def test_two_sounds_of_one_name_are_refused(session):
 def test_one_sound_and_one_motion_belong_together(session, tmp_path):
     record, speech, _ = tiny_utterances(1)[0]
     phones = tmp_path / "labels.txt"
-    write_label_lines(phones, speech.phones)
+    phones.write_text(label_lines(speech.phones))
     files = [session / f"{record.id}.wav", shutil.move(session / f"{record.id}.npz", tmp_path / "mocap 07.npz")]
     corpus = new_corpus(tmp_path / "c")
     report = add(corpus, files, {"id": "Übung", "text": "so so", "emotion": "happy", "take": 3}, phones=phones)

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
-from corpora import EMOTIONS, tiny_corpus, tiny_layout, tiny_utterances
+from corpora import EMOTIONS, label_lines, tiny_corpus, tiny_layout, tiny_utterances
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.add.add import add
@@ -17,7 +17,7 @@ from facesynth.corpus.motion_files import channel_names, load_motion
 from facesynth.corpus.record import read_listed
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import save_wav
-from facesynth.speech.textgrid import write_label_lines, write_textgrid
+from facesynth.speech.textgrid import write_textgrid
 
 KINDS = [".wav", ".npz", ".z.npz", ".csv", ".TextGrid", ".lab", ".align", ".txt", ".emotions.csv"]
 """Files of a recording; z: compressed."""
@@ -52,7 +52,7 @@ def whole(tmp_path_factory):
     table = np.column_stack([np.arange(len(motion)) / 120, motion.frames])
     np.savetxt(folder / "a.csv", table, delimiter=",", header=header, comments="", fmt="%.4f")
     write_textgrid(folder / "a.TextGrid", speech.phones, [("good", 0.2, 0.5)])
-    write_label_lines(folder / "a.lab", speech.phones)
+    (folder / "a.lab").write_text(label_lines(speech.phones))
     (folder / "a.align").write_text("0 2000 sil\n2000 9000 good\n9000 20000 day\n", encoding="utf-8")
     (folder / "a.txt").write_text("Good day, and a “naïve” 喜び.\n", encoding="utf-8")
     (folder / "a.emotions.csv").write_text("end_s,emotion,intensity\n0.5,neutral,1\n9,sad,0.5\n", encoding="utf-8")

@@ -7,7 +7,7 @@ from facesynth.inference import FacesynthError, load
 from facesynth.inference.__main__ import main
 from facesynth.speech.audio import save_wav
 from facesynth.speech.phone_archive import is_installed
-from facesynth.speech.textgrid import read_label_lines
+from facesynth.speech.textgrid import read_labelled
 
 pytestmark = pytest.mark.skipif(not is_installed(), reason="the weights that phones are heard with are not installed")
 
@@ -24,7 +24,7 @@ def test_the_runtime_prints_lines_of_phones(folder, talk, tmp_path, capsys):
     save_wav(tmp_path / "a.wav", *talk)
     main([str(folder), str(tmp_path / "a.wav")])
     (tmp_path / "a.lab").write_text(capsys.readouterr().out)
-    assert read_label_lines(tmp_path / "a.lab").labels == load(folder).hear(*talk).labels
+    assert read_labelled(tmp_path / "a.lab").phones.labels == load(folder).hear(*talk).labels
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise, product
 from types import SimpleNamespace
 
@@ -107,17 +108,25 @@ def way(request, monkeypatch):
         monkeypatch.setattr(pruning, "MANY", 0)
 
 
+@cache
+def literally_searched(pnt):
+    """Four times motion nodes, and of three utterances targets, least cost and path: every way through the search meets them."""
+    rng, found = np.random.default_rng(int(pnt * 10)), []
+    for _ in range(4):
+        nodes = Recorded.random(rng)
+        costs = nodes.costs(weights_of(pnt))
+        targets = [random_targets(rng, length, len(nodes), pnt) for length in (1, 7, 4)]
+        found.append((nodes, [(target, *viterbi(target, [costs] * (len(target) - 1))) for target in targets]))
+    return found
+
+
 @pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("pnt", [0.01, 1.0, 30.0, 1000.0])
 def test_motion_nodes_as_by_the_literal_algorithm_in_batches_of_unequal_lengths(pnt):
-    rng = np.random.default_rng(int(pnt * 10))
-    for _ in range(4):
-        nodes, weights = Recorded.random(rng), weights_of(pnt)
-        targets = [random_targets(rng, length, len(nodes), pnt) for length in (1, 7, 4)]
-        found = MotionNodeSearch(MotionNodeSteps(nodes, weights), classes_of(nodes)).cheapest(as_tensors(targets))
-        costs = nodes.costs(weights)
-        for target, path, cost in zip(targets, found.path.tolist(), found.cost.tolist(), strict=True):
-            least, wanted = viterbi(target, [costs] * (len(target) - 1))
+    for nodes, utterances in literally_searched(pnt):
+        search = MotionNodeSearch(MotionNodeSteps(nodes, weights_of(pnt)), classes_of(nodes))
+        found = search.cheapest(as_tensors(target for target, *_ in utterances))
+        for (target, least, wanted), path, cost in zip(utterances, found.path.tolist(), found.cost.tolist(), strict=True):
             assert cost == pytest.approx(least, rel=1e-12)
             assert path == wanted + [-1] * (7 - len(target))
 

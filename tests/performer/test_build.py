@@ -12,7 +12,7 @@ from facesynth.performer import capture as stage_capture
 from facesynth.performer.build import build_performer
 from facesynth.performer.script import Sentence, load_script
 from facesynth.performer.takes import takes_of
-from facesynth.performer.truth import contaminated_nodes, read_truth
+from facesynth.performer.truth import read_truth
 
 SCRIPT = (Sentence(1, "Stop it right now!"), Sentence(2, "Maybe my mother was home."))
 
@@ -143,7 +143,7 @@ def test_a_clean_build_has_no_faults(short_script, tmp_path, monkeypatch):
 def test_the_corpus_check_finds_contaminated_takes(short_script, tmp_path, monkeypatch):
     monkeypatch.setattr(stage_capture, "CONTAMINATED_SHARE", 1.0)
     corpus = build_performer("small", path=tmp_path / "c", workers=1)
-    contaminated = {node.split(":")[0] for node in contaminated_nodes(read_truth(corpus.path))}
+    contaminated = {take for take, faults in read_truth(corpus.path).items() if any(fault.phone is not None for fault in faults)}
     found = {record.id for problem in check(corpus) for record in corpus.records if record.id in problem.file}
     assert len(contaminated) == len(corpus)
     assert len(contaminated & found) >= 0.75 * len(contaminated)

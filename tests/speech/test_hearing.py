@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
+from corpora import label_lines
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.audio import save_wav
 from facesynth.speech.hearing import hear
-from facesynth.speech.textgrid import write_label_lines, write_textgrid
+from facesynth.speech.textgrid import write_textgrid
 
 TRACK = PhoneTrack(("pau", "m", "aa", "pau"), np.array([0.2, 0.3, 0.8, 1.0]))
 
@@ -30,7 +31,7 @@ def test_phones_from_a_textgrid(hum, tmp_path):
 
 
 def test_phones_from_label_lines_are_completed_to_the_end_of_the_sound(hum, tmp_path):
-    write_label_lines(tmp_path / "a.lab", PhoneTrack(("m", "aa"), np.array([0.3, 0.6])))
+    (tmp_path / "a.lab").write_text(label_lines(PhoneTrack(("m", "aa"), np.array([0.3, 0.6]))))
     heard = hear(hum, phones_path=tmp_path / "a.lab")
     assert heard.source == "labels"
     assert heard.speech.phones.labels == ("m", "aa", "pau")
@@ -39,15 +40,15 @@ def test_phones_from_label_lines_are_completed_to_the_end_of_the_sound(hum, tmp_
 
 
 def test_phones_a_little_longer_than_the_sound_are_cut_much_longer_ones_refused(hum, tmp_path):
-    write_label_lines(tmp_path / "a.lab", PhoneTrack(("m", "aa"), np.array([0.3, 1.15])))
+    (tmp_path / "a.lab").write_text(label_lines(PhoneTrack(("m", "aa"), np.array([0.3, 1.15]))))
     assert hear(hum, phones_path=tmp_path / "a.lab").speech.duration_s == 1.0
-    write_label_lines(tmp_path / "b.lab", PhoneTrack(("m", "aa"), np.array([0.3, 1.25])))
+    (tmp_path / "b.lab").write_text(label_lines(PhoneTrack(("m", "aa"), np.array([0.3, 1.25]))))
     with pytest.raises(FacesynthError, match=r"ends at 1.25 s, the sound at 1.00 s"):
         hear(hum, phones_path=tmp_path / "b.lab")
 
 
 def test_a_track_of_emotions(hum, tmp_path):
-    write_label_lines(tmp_path / "a.lab", TRACK)
+    (tmp_path / "a.lab").write_text(label_lines(TRACK))
     (tmp_path / "e.csv").write_text("end_s,emotion,intensity\n0.5,happy,1\n1,sad,0.5\n")
     emotions = hear(hum, phones_path=tmp_path / "a.lab", emotions_path=tmp_path / "e.csv").speech.emotions
     assert emotions.labels == ("happy", "sad")
@@ -55,7 +56,7 @@ def test_a_track_of_emotions(hum, tmp_path):
 
 
 def test_what_cannot_be_heard(tmp_path, hum):
-    write_label_lines(tmp_path / "a.lab", TRACK)
+    (tmp_path / "a.lab").write_text(label_lines(TRACK))
     save_wav(tmp_path / "short.wav", np.ones(160, np.float32), 16000)
     save_wav(tmp_path / "silent.wav", np.zeros(16000, np.float32), 16000)
     with pytest.raises(FacesynthError, match="10 ms"):

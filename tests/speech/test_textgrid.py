@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from corpora import label_lines
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -8,7 +9,7 @@ from facesynth.inference.phones import PHONES
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.phone_sources import find_phones
 from facesynth.speech.segments import covering, in_one, phone_track, within
-from facesynth.speech.textgrid import read_label_lines, read_labelled, read_textgrid, write_label_lines, write_textgrid
+from facesynth.speech.textgrid import read_labelled, read_textgrid, write_textgrid
 
 TRACK = PhoneTrack(("pau", "hh", "ah", "l", "ow", "pau"), np.array([0.1, 0.2, 1 / 3, 0.4, 0.55, 0.9]))
 WORDS = (("hello", 0.1, 0.55),)
@@ -31,8 +32,8 @@ def test_any_track_round_trips(tmp_path_factory, phones):
     track = PhoneTrack(labels, np.cumsum(lengths))
     folder = tmp_path_factory.mktemp("grid")
     write_textgrid(folder / "a.TextGrid", track)
-    write_label_lines(folder / "a.lab", track)
-    for got in (read_textgrid(folder / "a.TextGrid")[0], read_label_lines(folder / "a.lab")):
+    (folder / "a.lab").write_text(label_lines(track))
+    for got in (read_textgrid(folder / "a.TextGrid")[0], read_labelled(folder / "a.lab").phones):
         assert got.labels == track.labels
         np.testing.assert_allclose(got.ends_s, track.ends_s, atol=1e-6)
 
@@ -122,11 +123,11 @@ def test_textgrids_that_cannot_be_used(tmp_path):
 
 def test_label_lines_of_both_kinds(tmp_path):
     (tmp_path / "a.lab").write_text("# Deng's form\n0.25 sil\n\n0.5 B\r\n1.0 AA1\n")
-    track = read_label_lines(tmp_path / "a.lab")
+    track = read_labelled(tmp_path / "a.lab").phones
     assert track.labels == ("pau", "b", "aa")
     np.testing.assert_allclose(track.ends_s, [0.25, 0.5, 1.0])
     (tmp_path / "b.lab").write_text("0.1 0.3 b\n0.5 0.6 aa\n")
-    track = read_label_lines(tmp_path / "b.lab")
+    track = read_labelled(tmp_path / "b.lab").phones
     assert track.labels == ("pau", "b", "pau", "aa")
     np.testing.assert_allclose(track.ends_s, [0.1, 0.3, 0.5, 0.6])
 
@@ -135,18 +136,18 @@ def test_label_lines_of_both_kinds(tmp_path):
 def test_bad_label_lines_are_named(tmp_path, text):
     (tmp_path / "a.lab").write_text(text)
     with pytest.raises(FacesynthError, match=r"line \d"):
-        read_label_lines(tmp_path / "a.lab")
+        read_labelled(tmp_path / "a.lab")
 
 
 def test_label_files_that_are_none(tmp_path):
     with pytest.raises(FacesynthError, match="no such file"):
-        read_label_lines(tmp_path / "a.lab")
+        read_labelled(tmp_path / "a.lab")
     (tmp_path / "a.lab").write_text("")
     with pytest.raises(FacesynthError, match="not one phone"):
-        read_label_lines(tmp_path / "a.lab")
+        read_labelled(tmp_path / "a.lab")
     (tmp_path / "a.lab").write_bytes(b"\xff\xfe\x00\xd8")
     with pytest.raises(FacesynthError, match="UTF-8"):
-        read_label_lines(tmp_path / "a.lab")
+        read_labelled(tmp_path / "a.lab")
 
 
 def test_closures_join_their_release():

@@ -11,6 +11,7 @@ from facesynth.capture.points.footage import Footage, read_footage
 from facesynth.capture.points.reference import Following, Reference
 from facesynth.capture.points.shapes import Shapes
 from facesynth.capture.points.tracking import Drift
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
 from facesynth.motion.planar import HeadMaps
@@ -64,12 +65,10 @@ def _found(reference: Reference, footage: Footage, video: Path) -> tuple[Shapes,
 def _place(video: Path, reference: Reference) -> Path:
     if not video.is_file():
         raise FacesynthError(f"{video}: no such file")
-    with open(video, "rb") as file:
-        content = hashlib.file_digest(file, "sha256").hexdigest()
     made_by = hashlib.sha256(str(VERSION).encode())
     for array in (reference.picture, reference.points, reference.mean):
         made_by.update(np.ascontiguousarray(array).tobytes())
-    return cache_dir("tracks") / f"{content[:32]}-points-{made_by.hexdigest()[:16]}.npz"
+    return cache_dir("tracks") / f"{hash_file(video)[:32]}-points-{made_by.hexdigest()[:16]}.npz"
 
 
 def _read(kept: Path) -> tuple[Shapes, Following, bool] | None:

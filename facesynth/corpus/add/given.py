@@ -8,7 +8,7 @@ from typing import Any
 
 from facesynth.corpus.add.recordings import Recording
 from facesynth.corpus.record import Record, cell
-from facesynth.corpus.signals import hash_file
+from facesynth.hashing import hash_file
 
 DIGITS = 16
 """Of a sha256, in hexadecimal: two things that a person might give never share them."""

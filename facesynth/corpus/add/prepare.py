@@ -17,8 +17,9 @@ from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.importers.unpack import read_into, unpacked, with_unpacked
 from facesynth.corpus.limits import LARGEST_DIFFERENCE_S, LARGEST_MISSING_SHARE
 from facesynth.corpus.record import Record
-from facesynth.corpus.signals import PARTS, Part, hash_file, hash_signals, lost_parts, read_speech
+from facesynth.corpus.signals import PARTS, Part, hash_signals, lost_parts, read_speech
 from facesynth.encoding import encoding_remark
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech

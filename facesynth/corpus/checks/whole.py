@@ -14,8 +14,8 @@ from facesynth.corpus.files import Files
 from facesynth.corpus.header import Header
 from facesynth.corpus.journal import ADDED, Journal, parse_node
 from facesynth.corpus.record import Record, plain_words
-from facesynth.corpus.signals import hash_file
 from facesynth.corpus.splits import by_sentence
+from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import PHONES
 from facesynth.speech.audio import load_audio
