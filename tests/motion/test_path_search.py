@@ -104,7 +104,7 @@ def way(request, monkeypatch):
         monkeypatch.setattr(pruning, "FEW", 0)
         monkeypatch.setattr(pruning, "TRIED", 3)
     if request.param == "small blocks":
-        monkeypatch.setattr(steps, "ON_PROCESSOR", 50)
+        monkeypatch.setattr(steps, "ON_PROCESSOR", 130)
         monkeypatch.setattr(pruning, "MANY", 0)
 
 
@@ -283,10 +283,7 @@ def test_cold_the_mean_is_the_cheapest_path():
     assert -1e-6 * float(found.log_z) == pytest.approx(float(best.cost))
 
 
-@pytest.mark.parametrize("small", [False, True])
-def test_gradients_are_those_of_small_steps(small, monkeypatch):
-    if small:
-        monkeypatch.setattr(steps, "ON_PROCESSOR", 20)
+def test_gradients_are_those_of_small_steps_and_the_same_in_small_blocks(monkeypatch):
     rng = np.random.default_rng(8)
     nodes = Recorded.random(rng, 7, in_a_row=4)
     targets = [torch.as_tensor(rng.exponential(2.0, (2, 7))).requires_grad_() for _ in range(3)]
@@ -301,7 +298,15 @@ def test_gradients_are_those_of_small_steps(small, monkeypatch):
         found = posterior(asked, NodePath(made, [torch.arange(7)] * 3), temperature, torch.tensor([3, 2]))
         return *found.nodes, found.captured(0), found.log_z
 
+    def gradients():
+        made = shares(numbers, *targets)
+        return torch.autograd.grad(made, (numbers, *targets), [torch.ones_like(one).cumsum(dim=-1) for one in made])
+
     assert torch.autograd.gradcheck(shares, (numbers, *targets))
+    whole = gradients()
+    monkeypatch.setattr(steps, "ON_PROCESSOR", 20)
+    for one, other in zip(gradients(), whole, strict=True):
+        torch.testing.assert_close(one, other)
 
 
 def test_given_costs_find_the_cheapest_of_all():

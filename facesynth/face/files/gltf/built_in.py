@@ -1,6 +1,7 @@
 """The built-in head with its 52 shapes and an animation as a glTF document."""
 
 import io
+from functools import lru_cache
 
 import numpy as np
 import pygltflib as gl
@@ -29,6 +30,7 @@ SIDE = 2048
 _BROW_DENSITY = 0.8  # the strands of the brows are not part of a mesh: their shade is
 
 
+@lru_cache(maxsize=1)
 def skin_jpeg(rig: Rig) -> bytes:
     """The skin in display values, rows from the top of the texture map down; nothing is left bare between its islands."""
     from PIL import Image
