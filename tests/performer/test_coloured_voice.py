@@ -4,12 +4,13 @@ import sys
 
 import numpy as np
 import pytest
+from acting import phones_of
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.performer import voice as voice_room
 from facesynth.performer.lines import DEMO_LINES, speak_lines
 from facesynth.performer.prosody import EMOTIONS, analyse, colour
-from facesynth.performer.script import load_script, phones_of
+from facesynth.performer.script import load_script
 from facesynth.performer.voice import speak
 
 SENTENCE = "She put a huge yellow cushion on the couch by the fire."
