@@ -21,6 +21,8 @@ from facesynth.studio.studio import Studio
 
 NEAR_S = 1.0
 """Before and after the playhead, what is made first."""
+DRAGGED_S = 0.15
+"""The same while something is dragged: the face at the playhead follows, the rest when the pointer rests."""
 LONGEST_S = 1e6
 """Further than that no line goes, whatever a page says."""
 BATCH_S = 4
@@ -136,10 +138,15 @@ class SocketWindow:
         now = await studio.away(performing.change, sound, studio.project.edits, line, take)
         pieces = self._fresh.setdefault((performing, wanted.line, wanted.take), {})
         order = near_first(now.speech.duration_s, wanted.at_s, wanted.sight_s)
+        if wanted.trial is not None:
+            order = [order[0]]
+            at_s = min(wanted.at_s, now.speech.duration_s)
+            shown = await studio.away(performing.stretch, now, max(at_s - DRAGGED_S, 0.0), at_s + DRAGGED_S)
+            await self._send(face_message(shown, last=False, **about))
         batches = [batch for batch in order if any(performing.stale(pieces.get(k, 0), k, k + 1) for k in batch)] or order[:1]
         generation = performing.generation
-        for number, batch in enumerate(batches[:1] if wanted.trial else batches, start=1):
-            if self._wanted is not None and number > 1:
+        for number, batch in enumerate(batches, start=1):
+            if self._wanted is not None and (number > 1 or wanted.trial is not None):
                 return
             shown = await studio.away(performing.stretch, now, float(batch.start), float(batch.stop))
             await self._send(face_message(shown, last=number == len(batches), **about))

@@ -11,7 +11,7 @@ from facesynth.inference.efase import steps
 from facesynth.inference.efase.bounds import step_bounds
 from facesynth.inference.efase.costs import Query, Weights, all_targets
 from facesynth.inference.efase.nodes import Nodes
-from facesynth.inference.efase.search import SearchIndex
+from facesynth.inference.efase.search import BEAM, Search, SearchIndex
 from facesynth.methods.efase.torch_search import torch_engine
 
 
@@ -123,7 +123,9 @@ def test_changing_one_constraint_leaves_distant_choices_alone():
     assert np.abs(changed - 20).max() < 15
 
 
-def test_a_constraint_far_from_all_that_is_near_is_found_exactly_in_little_memory():
+def test_a_constraint_far_from_all_that_is_near_is_found_exactly_in_little_memory(monkeypatch):
+    predecessors, reached = [], Search._reached
+    monkeypatch.setattr(Search, "_reached", lambda self, i, *rest: predecessors.append(len(i)) or reached(self, i, *rest))
     rng = np.random.default_rng(8)
     nodes, weights = random_nodes(rng, 1500, phones=30, emotions=3, width=4), Weights(3000.0, delta=0.06)
     index = SearchIndex(nodes, weights, step_bounds(nodes, weights))
@@ -143,6 +145,7 @@ def test_a_constraint_far_from_all_that_is_near_is_found_exactly_in_little_memor
         found = targets[np.arange(20), path].sum() + steps.step_costs(nodes, path[:-1], path[1:], weights).sum()
         np.testing.assert_allclose(found, phi.min(), rtol=1e-9)
         assert most < 80e6
+    assert max(predecessors) <= 2 * BEAM
 
 
 def test_where_penalties_are_small_beside_joints_nothing_is_lost():

@@ -53,6 +53,12 @@ class Query:
     def __len__(self) -> int:
         return len(self.phones)
 
+    def asked(self, t: int) -> tuple[object, ...]:
+        """What is asked for at a position: where it is the same, so are the costs."""
+        strict = self.strict is not None and bool(self.strict[t])
+        asked = (int(self.phones[t]), int(self.visemes[t]), int(self.emotions[t]), strict, self.fixed.get(t))
+        return asked if self.heard is None else (*asked, t)
+
     def part(self, places: Ints) -> "Query":
         """The query at consecutive positions."""
         first = int(places[0])
@@ -81,5 +87,9 @@ def target_costs(nodes: Nodes, query: Query, t: int, weights: Weights) -> Floats
 
 
 def all_targets(nodes: Nodes, query: Query, weights: Weights) -> Floats:
-    """[T, N] `target_costs` of every position."""
-    return np.stack([target_costs(nodes, query, t, weights) for t in range(len(query))])
+    """[T, N] `target_costs` of every position; those that ask for the same are computed once."""
+    costs, known = np.empty((len(query), len(nodes))), dict[tuple[object, ...], int]()
+    for t in range(len(query)):
+        first = known.setdefault(query.asked(t), t)
+        costs[t] = costs[first] if first < t else target_costs(nodes, query, t, weights)
+    return costs

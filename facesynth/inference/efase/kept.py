@@ -73,34 +73,41 @@ class KeptSearches:
 
     def __call__(self, targets: Floats) -> Ints:
         """[T] the nodes of the path of least COST, by target costs [T, N]."""
-        shared = [_shared(targets, known) for known, _ in self._kept]
+        shared = self._shared(targets)
         best = int(np.argmax(shared)) if shared else -1
         search = self._kept[best][1].begun(shared[best]) if shared else Search(self.index)
         for target in targets[len(search) :]:
             search.push(target)
             self.phones_searched += 1
         path = search.path()
-        self._keep(targets, search)
+        self._keep(targets, search, shared)
         return path
 
-    def _keep(self, targets: Floats, search: Search) -> None:
+    def _shared(self, targets: Floats) -> list[int]:
+        """How many first rows each kept search has in common with these; a row that several searches share is compared once."""
+        equal: dict[int, bool] = {}
+        found = []
+        for known, search in self._kept:
+            count = 0
+            for row, other, position in zip(targets, known, search.positions, strict=False):
+                if id(position) not in equal:
+                    equal[id(position)] = np.array_equal(row, other)
+                if not equal[id(position)]:
+                    break
+                count += 1
+            found.append(count)
+        return found
+
+    def _keep(self, targets: Floats, search: Search, shared: Sequence[int]) -> None:
         """As the newest; of the others as many as fit into the memory. What they share is counted for each."""
         most = SEARCHES_BYTES // (POSITION_BYTES * targets.shape[1])
-        others = [(known, kept) for known, kept in self._kept if len(kept) > _shared(targets, known)]
+        others = [one for one, count in zip(self._kept, shared, strict=True) if len(one[1]) > count]
         self._kept = [(targets, search)]
         for known, kept in others:
             most -= len(kept)
             if most < len(search):
                 break
             self._kept.append((known, kept))
-
-
-def _shared(targets: Floats, known: Floats) -> int:
-    """How many first rows of two arrays are equal."""
-    for count, (row, other) in enumerate(zip(targets, known, strict=False)):
-        if not np.array_equal(row, other):
-            return count
-    return min(len(targets), len(known))
 
 
 class KeptMatrices:

@@ -18,7 +18,7 @@ from ..efase.nodes import Nodes
 from ..efase.plan import Plan, Solved, plan_speech
 from ..efase.search import Engine, SearchIndex, Stretch
 from ..efase.soft import Mix, StepMatrix, soft_search
-from ..efase.steps import path_cost, step_matrix
+from ..efase.steps import cost_along, step_matrix
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import at_rate, sharpen
@@ -168,7 +168,7 @@ class Efase:
         """One stretch of speech: its cheapest path and, above temperature 0, the mean over paths around it."""
         targets, temperature = all_targets(self.nodes, query, self.weights), self.settings.temperature
         path = (engine or self.parts.engine or self.index.cheapest_path)(targets)
-        cost, mixtures = path_cost(self.nodes, query, path, self.weights), None
+        cost, mixtures = cost_along(self.nodes, targets, path, self.weights), None
         if temperature > 0:
             limit, matrix = self.settings.candidates, self.parts.step_matrix
             mixtures = soft_search(self.nodes, query, targets, self.weights, path, temperature, limit, matrix, self.parts.mix)

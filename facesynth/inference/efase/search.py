@@ -45,8 +45,8 @@ MANY = 300
 """Nodes a phone, on average, for which a better upper bound is worth looking for."""
 REJOINED = 4
 """Phones back to where a path is looked for that reaches a node which the beam did not expect."""
-WIDE = 2000
-"""Nodes at each of those that it may go through."""
+WIDE, BENT = 2000, 256
+"""Nodes at each of those that it may go through, and those of them whose bending is computed."""
 FEW = 4
 """Nodes to which steps are computed one by one, in place of bounds of classes."""
 PAIRS = 1 << 19
@@ -223,8 +223,9 @@ class Search:
             limit = min(limit, _limit(self._rejoined()))
         kept = self._backwards(limit)
         if sum(len(some.nodes) for some in kept) > MANY * len(kept):
-            start = kept[0].nodes  # known, or none where all that counts is known later
-            limit = min(limit, _limit(self._led(kept[1:], start, self.positions[-len(kept)].phi[start])))
+            phi = self.positions[-len(kept)].phi[kept[0].nodes]  # known, or none where all that counts is known later
+            near = _least(phi + kept[0].rest, 2 * BEAM)
+            limit = min(limit, _limit(self._led(kept[1:], kept[0].nodes[near], phi[near])))
             kept = self._backwards(limit)
         for t in range(len(self) - len(kept) + 1, len(self)):
             self._forwards(t, kept[t - len(self) - 1].nodes, kept[t - len(self)], limit)
@@ -250,6 +251,7 @@ class Search:
         value, sets = last.targets[j], [Kept(j, np.ones(len(j), bool), np.zeros(len(j)))]
         for position in before:
             i = _least(position.phi, WIDE)
+            i = i[_least(position.phi[i] + self._onward(i, j, value, bent=False), BENT)]
             rest = self._onward(i, j, value)
             near = np.argsort(position.phi[i] + rest, kind="stable")[: 2 * BEAM]
             sets.append(Kept(i[near], np.ones(len(near), bool), rest[near]))
@@ -293,8 +295,8 @@ class Search:
             found.append(Kept(i[left], position.back[i[left]] == UNKNOWN, rest[left]))
         return found[::-1]
 
-    def _onward(self, i: Ints, j: Ints, value: Floats) -> Floats:
-        """[n] min over few nodes j [m] of TC(i, j) + value(j), rounded down, for the nodes i [n].
+    def _onward(self, i: Ints, j: Ints, value: Floats, bent: bool = True) -> Floats:
+        """[n] min over few nodes j [m] of TC(i, j) + value(j), rounded down, for the nodes i [n]; bent: with the bending.
 
         A hard constraint may be far from all that is near otherwise. The bounds of classes know of a class what its nearest
         node costs, and would leave half of the database to be looked at before such a node.
@@ -306,7 +308,7 @@ class Search:
                 least = np.minimum(least, after + w.alpha * w.pnt)
                 continue
             alike = np.flatnonzero(nodes.visemes[i] == nodes.visemes[before])
-            if len(alike):
+            if bent and len(alike):
                 cost[alike] += w.beta * bends(nodes, i[alike], np.array([before]))[:, 0] * (1 - MARGIN)
             cost[i == before] = 0.0
             least = np.minimum(least, after + cost)

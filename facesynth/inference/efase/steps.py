@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..efase.costs import Query, Weights, target_costs
+from ..efase.costs import Query, Weights, all_targets
 from ..efase.nodes import Nodes
 from ..products import product
 from ..warp import stretched
@@ -31,8 +31,12 @@ TOGETHER = 48
 
 def path_cost(nodes: Nodes, query: Query, path: Ints, weights: Weights) -> float:
     """The whole COST of one path [T]."""
-    targets = sum(float(target_costs(nodes, query, t, weights)[node]) for t, node in enumerate(path))
-    return targets + float(step_costs(nodes, path[:-1], path[1:], weights).sum())
+    return cost_along(nodes, all_targets(nodes, query, weights), path, weights)
+
+
+def cost_along(nodes: Nodes, targets: Floats, path: Ints, weights: Weights) -> float:
+    """The same by target costs [T, N] that are there already."""
+    return sum(targets[np.arange(len(path)), path].tolist()) + float(step_costs(nodes, path[:-1], path[1:], weights).sum())
 
 
 def step_costs(nodes: Nodes, i: Ints, j: Ints, weights: Weights) -> Floats:

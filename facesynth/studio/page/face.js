@@ -12,6 +12,10 @@ const DRAWN_BY_PROCESSOR = (() => {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 })();
 
+/** Pixels drawn for each of the page's, across: while the face moves, and when it has been still for MOVES_MS. */
+const RATIO = DRAWN_BY_PROCESSOR ? { moving: 0.5, still: 1 } : { moving: Math.min(devicePixelRatio, 2), still: Math.min(devicePixelRatio, 2) };
+const MOVES_MS = 250;
+
 let file = null; // the head is fetched once and read once for each window
 
 /** A head on a canvas; `pose(row, names)` moves it, `ghost(row)` a pale one over it. */
@@ -19,7 +23,7 @@ export class Face {
   constructor(canvas) {
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !DRAWN_BY_PROCESSOR });
-    this.renderer.setPixelRatio(DRAWN_BY_PROCESSOR ? 0.8 : Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(RATIO.still);
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0x20262e);
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 20);
@@ -31,6 +35,7 @@ export class Face {
     this.scene.add(key, new THREE.HemisphereLight(0xdfe9ff, 0x5a4a40, 1.5));
     this.wanted = false;
     this.drawn = 0; // pictures drawn so far, for the benchmark
+    this.before = -Infinity; // when the last one was drawn, ms
     new ResizeObserver(() => this.fit()).observe(canvas);
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
@@ -83,15 +88,24 @@ export class Face {
     this.ask();
   }
 
-  /** Draw before the screen shows its next picture. */
+  /** Draw before the screen shows its next picture; with fewer pixels where one picture soon follows another. */
   ask() {
     if (this.wanted || !this.body) return;
     this.wanted = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.wanted = false;
-      this.renderer.render(this.scene, this.camera);
-      this.drawn += 1;
+      const moves = now - this.before < MOVES_MS;
+      this.before = now;
+      this.draw(moves ? RATIO.moving : RATIO.still);
+      clearTimeout(this.resting);
+      if (RATIO.moving !== RATIO.still && moves) this.resting = setTimeout(() => this.draw(RATIO.still), MOVES_MS);
     });
+  }
+
+  draw(ratio) {
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.renderer.render(this.scene, this.camera);
+    this.drawn += 1;
   }
 
   fit() {

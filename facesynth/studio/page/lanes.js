@@ -1,6 +1,6 @@
 // Drawing the lanes of the timeline: only what is in sight.
 
-import { store, indexAt, isDoubted, startOf, rowAt } from "/page/store.js";
+import { store, indexAt, isDoubted, startOf, valueAt } from "/page/store.js";
 import { peaks, loop } from "/page/sound.js";
 import { view, x, at } from "/page/view.js";
 
@@ -167,7 +167,7 @@ export function drawCurve(c, lane, name) {
     c.strokeStyle = colour;
     c.beginPath();
     for (let pixel = 0; pixel <= view.width; pixel += 2) {
-      const value = rowAt(motion, at(pixel))[column];
+      const value = valueAt(motion, at(pixel), column);
       c.lineTo(pixel, lane.top + lane.height - 3 - (lane.height - 8) * value);
     }
     c.stroke();

@@ -125,6 +125,14 @@ export function motionOf(message, known) {
   return { names, columns, count, fps, rows };
 }
 
+/** One column of a motion at a time, between its frames. */
+export function valueAt({ rows, columns, count, fps }, time, column) {
+  const place = Math.min(Math.max(time * fps, 0), count - 1);
+  const first = Math.floor(place);
+  const value = rows[first * columns + column];
+  return value + (place - first) * (rows[Math.min(first + 1, count - 1) * columns + column] - value);
+}
+
 /** The row of a motion at a time, between its frames. */
 export function rowAt(motion, time) {
   const place = Math.min(Math.max(time * motion.fps, 0), motion.count - 1);
