@@ -29,10 +29,11 @@ from facesynth.face.behaviour.eyes import quiet_eyes
 from facesynth.inference.eyes import at_rest
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
-from facesynth.inference.shift_patches import LISTENING, SPEAKING
+from facesynth.inference.shift_patches import EITHER, LISTENING, SPEAKING
 from facesynth.inference.speech import PhoneTrack
 from facesynth.methods.eyes.method import Eyes
-from facesynth.motion.lids import opening_of, shut_level
+from facesynth.methods.eyes.recordings import at_rate
+from facesynth.motion.lids import Lids
 
 LAYOUT = Layout("curves", ("jawOpen",))
 PX_PER_DEG = 60.0
@@ -43,7 +44,9 @@ SHIFT_S = 0.06
 HEAD_FPS, AVERAGED = 60.0, 7
 """Of head_conversation; its spectrum is zero at multiples of 60/7 Hz: it was averaged over 7 frames."""
 COMPENSATION = 0.6
-"""Share of the head's quick turns that the package's eyes undo; no recording here shows any."""
+"""Share of the head's quick turns that is undone in one row."""
+BLINKS = 26.0
+"""A minute, of people in conversation (Bentivoglio et al. 1997, mean of 150); the talker who lends the lids blinks more often."""
 MOST_S = 120.0
 """Of each person in each role the package's model learns from no more, so that nobody outweighs the others."""
 GROWN_S = 120.0
@@ -67,17 +70,29 @@ def main() -> None:
     people = heads_and_eyes(options.data / "head_conversation")
     paths = sorted((options.data / "gaze_conversation").glob("*.csv"))
     seen = {role: [scanpaths(path, said) for path in paths] for role, said in ROLES.items()}
-    packaged = as_packaged(seen, lids=lids)
+    packaged = as_packaged(seen, people, lids=lids)
     packaged.provenance = PROVENANCE
     if options.write:
         packaged.save(options.write)
         print(packaged.facts, options.write.stat().st_size, "bytes")
     if options.picture:
         draw(people[0], lids, packaged, options.picture)
-    for role in ROLES:
-        table(f"gaze_conversation, {role}, one of 12 people left out", fixation_rows(seen, role, people))
-    table("head_conversation, one of 2 people left out", gaze_rows(people, packaged, seen))
+    found = {f"gaze_conversation, {role}": fixation_rows(seen, role, people) for role in ROLES}
+    found["head_conversation"] = gaze_rows(people, seen)
+    for title, rows in found.items():
+        table(f"{title}, one person left out", rows)
+    table("mean distances, each person left out", over_all(found))
     table("blinks of the corpus, half of the recordings left out", blink_rows(lids))
+
+
+def over_all(found: dict[str, dict[str, dict[str, float]]]) -> dict[str, dict[str, float]]:
+    """Of each row that all tables have, the mean of each; speaking and listening together count as the other corpus does."""
+    shared = [row for row in found["head_conversation"] if all(row in rows for rows in found.values())]
+    means = {row: [float(np.mean(list(rows[row].values()))) for rows in found.values()] for row in shared}
+    return {
+        row: {"gaze_conversation": (speaking + listening) / 2, "head_conversation": beside_head}
+        for row, (speaking, listening, beside_head) in means.items()
+    }
 
 
 def table(title: str, rows: dict[str, dict[str, float]]) -> None:
@@ -139,19 +154,20 @@ def learnt(motions: list[Motion], lids: list[Motion] | None = None, roles: list[
     return model.eval()
 
 
-def as_packaged(seen: People, without: int | None = None, lids: list[Motion] | None = None) -> Eyes:
-    """The model that comes with the package, or what it would be without one of the people.
+def as_packaged(seen: People, people: list[Motion], without: int | None = None, lids: list[Motion] | None = None) -> Eyes:
+    """The model that comes with the package, or what it would be without one of those whose fixations were seen.
 
+    Who speaks and who listens is known of those; where nobody knows it, eyes move as those of `people` beside their heads did.
     Everybody's gaze is brought to the spread of all in that role: people differ more in how far they look than in how.
     """
     motions, roles = [], []
-    for role, people in seen.items():
-        some = [most_of(person) for k, person in enumerate(people) if k != without and person]
+    groups = {NUMBERS[role]: [most_of(one) for k, one in enumerate(all_) if k != without and one] for role, all_ in seen.items()}
+    for role, some in {**groups, EITHER: [at_rate(one, FIXATION_FPS) for one in people]}.items():
         spreads = [np.nanstd(motion.eyes[:, 1:]) for motion in some]
         usual = np.exp(np.mean(np.log(spreads)))
         motions += [scaled(motion, usual / spread) for motion, spread in zip(some, spreads, strict=True)]
-        roles += [NUMBERS[role]] * len(some)
-    return learnt(motions, lids, roles, joins="shifts", compensation=COMPENSATION)
+        roles += [role] * len(some)
+    return learnt(motions, lids, roles, joins="shifts", most_blinks=BLINKS)
 
 
 def most_of(person: list[Motion]) -> Motion:
@@ -165,10 +181,15 @@ def scaled(motion: Motion, gain: float) -> Motion:
 
 
 PROVENANCE = {
-    "performer": "gaze: twelve people of gaze_conversation; lids: GRID talker s1",
-    "sources": ["Eye gaze during conversation (ETRA 2024)", "https://doi.org/10.1121/1.2229005"],
+    "performer": "gaze: twelve people of gaze_conversation, two of head_conversation; lids: GRID talker s1",
+    "sources": [
+        "Eye gaze during conversation (ETRA 2024)",
+        "https://github.com/MCMartinLee/Conversation_Demo",
+        "https://doi.org/10.1121/1.2229005",
+    ],
     "licences": [
         "Apache-2.0: Dembinsky, Watanabe, Dengel, Ishimaru 2024 (gaze)",
+        "MIT: MCMartinLee, Conversation_Demo (gaze beside heads)",
         "CC BY 4.0: Cooke, Barker, Cunningham, Shao 2006 (lids)",
     ],
     "consents": ["as the data sets state"],
@@ -182,8 +203,8 @@ def draw(person: Motion, lids: list[Motion], packaged: Eyes, path: Path) -> None
 
     part = slice(round(100 * HEAD_FPS), round(120 * HEAD_FPS))
     recorded = Motion(person.frames[part], HEAD_FPS, LAYOUT, person.head[part], person.eyes[part])
-    shut = shut_level(lids)
-    seen = np.concatenate([opening_of(motion, shut)[:, 0] for motion in lids])[: round(20 * lids[0].fps)]
+    shown = Lids.of(lids)
+    seen = np.concatenate([shown.opening(motion)[:, 0] for motion in lids])[: round(20 * lids[0].fps)]
     made = packaged.look(recorded, seed=1, phones=said("speaking", 20.0), turning=False)
     figure = Figure(figsize=(12, 6), layout="constrained")
     axes = figure.subplots(3, 2, sharex=True, sharey="row")
@@ -236,7 +257,7 @@ def fixation_rows(seen: People, role: str, others_people: list[Motion]) -> dict[
         made = {
             "texture synthesis": eyes_of(learnt(persons), still, left_out),
             "joined anywhere, as in the dissertation": eyes_of(learnt(persons, joins="anywhere"), still, left_out),
-            "the package's model without the person": eyes_of(as_packaged(seen, left_out), still, left_out, role),
+            "the package's model without the person": eyes_of(as_packaged(seen, others_people, left_out), still, left_out, role),
             "texture synthesis by two people of head_conversation": eyes_of(learnt(others_people), still, left_out),
             "constants": quiet_eyes(np.zeros((len(still), 6)), FIXATION_FPS, None, left_out),
             "random gaze": random_eyes(still.duration_s, FIXATION_FPS, **chance, blinks=17, seed=left_out),
@@ -275,7 +296,7 @@ def cut(gaze: np.ndarray, lengths: list[int]) -> list[np.ndarray]:
     return np.split(gaze.astype(np.float64), np.cumsum(lengths)[:-1])
 
 
-def gaze_rows(people: list[Motion], packaged: Eyes, seen: People) -> dict[str, dict[str, float]]:
+def gaze_rows(people: list[Motion], seen: People) -> dict[str, dict[str, float]]:
     parts = []
     elsewhere = [piece.eyes[:, 1:].astype(np.float64) for persons in seen.values() for person in persons for piece in person]
     for left_out, own in enumerate(people):
@@ -289,11 +310,12 @@ def gaze_rows(people: list[Motion], packaged: Eyes, seen: People) -> dict[str, d
             "texture synthesis that undoes 0.6": eyes_of(learnt(others, compensation=COMPENSATION), own, left_out),
             "constants": quiet_eyes(own.head, HEAD_FPS, None, left_out),
             "random gaze": random_eyes(own.duration_s, HEAD_FPS, **chance, blinks=17, seed=left_out),
-            "the package's model (gaze_conversation)": eyes_of(packaged, own, left_out),
+            "the package's model without the person": eyes_of(as_packaged(seen, others), own, left_out),
+            "the package's, as if the person spoke": eyes_of(as_packaged(seen, others), own, left_out, "speaking"),
             "random gaze by gaze_conversation": random_eyes(own.duration_s, HEAD_FPS, **far_chance, blinks=17, seed=left_out),
         }
         # what was not learned from averaged gaze is averaged as the recordings were
-        learned = [row for row in made if "synthesis" in row or "anywhere" in row]
+        learned = [row for row in made if "synthesis" in row or "anywhere" in row or row.endswith("without the person")]
         gazes = {row: averaged(eyes[:, 1:].astype(np.float64), 1 if row in learned else AVERAGED) for row, eyes in made.items()}
         parts.append({row: distances(gaze_statistics(gaze, own.head, HEAD_FPS), recorded) for row, gaze in gazes.items()})
     return mean_rows(parts)
@@ -301,12 +323,12 @@ def gaze_rows(people: list[Motion], packaged: Eyes, seen: People) -> dict[str, d
 
 def blink_rows(lids: list[Motion]) -> dict[str, dict[str, float]]:
     """Recordings of 3 s each, and as many as long of each row."""
-    shut, parts = shut_level(lids), []
+    shown, parts = Lids.of(lids), []
     for half in (0, 1):
         own, others = lids[half::2], lids[1 - half :: 2]
         whole = [motion for motion in own if np.isfinite(motion.eyes).all()]
-        recorded = pooled([blink_statistics(opening_of(motion, shut)[:, 0], motion.fps) for motion in whole])
-        rate = blinks_a_minute(others, shut)
+        recorded = pooled([blink_statistics(shown.opening(motion)[:, 0], motion.fps) for motion in whole])
+        rate = blinks_a_minute(others, shown)
         model = learnt(others)
         rows = {
             "texture synthesis": lambda motion, seed, model=model: model.look(motion, seed=seed).eyes,
@@ -326,9 +348,9 @@ def blink_rows(lids: list[Motion]) -> dict[str, dict[str, float]]:
     return mean_rows(parts)
 
 
-def blinks_a_minute(motions: list[Motion], shut: float) -> float:
+def blinks_a_minute(motions: list[Motion], shown: Lids) -> float:
     whole = [motion for motion in motions if np.isfinite(motion.eyes).all()]
-    return float(np.mean(pooled([blink_statistics(opening_of(m, shut)[:, 0], m.fps) for m in whole])["blinks a minute"]))
+    return float(np.mean(pooled([blink_statistics(shown.opening(m)[:, 0], m.fps) for m in whole])["blinks a minute"]))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from facesynth.evaluation.eyes import Samples, blink_statistics, distances, fixa
 from facesynth.inference.arrays import Floats
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.recordings import whole_pieces
-from facesynth.motion.lids import eyes_of, opening_of
+from facesynth.motion.lids import Lids, eyes_of
 
 CONFIG = Path(__file__).parents[1] / "configs" / "eyes.yaml"
 LEAST_S = 1.0
@@ -48,9 +48,10 @@ def main() -> None:
     # evaluate: Kolmogorov-Smirnov distances, for heads that move as those of the recordings do
     own, made = [], []
     pieces = [piece for motion, _ in recorded_eyes(held_out) for piece in whole_pieces(motion, LEAST_S)]
+    shown = Lids.of(pieces)
     for number, piece in enumerate(pieces):
         grown = eyes_of(model.look(piece, seed=options.seed + number))
-        own.append(measured(opening_of(piece, model.facts["shut_level"]), eyes_of(piece), piece.fps))
+        own.append(measured(shown.opening(piece), eyes_of(piece), piece.fps))
         made.append(measured(grown[:, :1].astype(np.float64), grown, piece.fps))
     for name, apart in distances(pooled(made), pooled(own)).items() if own else ():
         print(f"{name}: {apart:.2f} apart")

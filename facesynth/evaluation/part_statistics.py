@@ -15,7 +15,7 @@ from facesynth.evaluation.head_statistics import HeadSample, take_apart
 from facesynth.evaluation.table import Column
 from facesynth.inference.motion import Motion
 from facesynth.methods.capabilities import Part
-from facesynth.motion.lids import opening_of, shut_level
+from facesynth.motion.lids import Lids
 
 HEAD = {
     "speed in speech": "head_speed",
@@ -86,12 +86,12 @@ def _known(made: np.ndarray | None, recorded: np.ndarray | None) -> bool:
 
 def _eye_samples(motions: Sequence[Motion]) -> Samples:
     """Fixations, gaze and blinks of one side together."""
-    shut, parts = shut_level(motions), list[Samples]()
+    lids, parts = Lids.of(motions), list[Samples]()
     for motion in motions:
         assert motion.eyes is not None  # noqa: S101 - chosen by `add`
         gaze = motion.eyes[:, 1:].astype(np.float64)
         still = np.zeros((len(gaze), 6)) if motion.head is None else motion.head
         moves = gaze_statistics(gaze, still, motion.fps)
-        blinks = blink_statistics(opening_of(motion, shut)[:, 0], motion.fps)
+        blinks = blink_statistics(lids.opening(motion)[:, 0], motion.fps)
         parts.append({**fixation_statistics(gaze, motion.fps), **{n: moves[n] for n in moves if n in EYES}, **blinks})
     return pooled(parts)

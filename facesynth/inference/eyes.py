@@ -18,7 +18,7 @@ from .layout import Layout
 from .motion import Motion
 from .patches import Growth, PatchSettings, PatchTexture
 from .phones import SILENCE
-from .shift_patches import EITHER, LISTENING, SPEAKING, ShiftTexture
+from .shift_patches import EITHER, LISTENING, ROLES, SPEAKING, ShiftTexture
 from .speech import PhoneTrack, Speech
 
 SHIFTS, ANYWHERE = "shifts", "anywhere"
@@ -44,8 +44,8 @@ class Parts:
     joins: str
     """Where patches are joined: "shifts" or "anywhere"."""
     settings: PatchSettings
-    compensation: float
-    """Share of the head's quick turns that the eyes undo."""
+    compensation: NDArray[np.floating]
+    """[3] share of the head's quick turns that the eyes undo in each of `ROLES`."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that the model came from, if it came from one."""
 
@@ -66,18 +66,19 @@ class Eyes:
         still = at_rest(self.layout, int(speech.phones.frame_bounds(self.fps)[-1]), self.fps)
         return self.look(still, seed=seed, phones=speech.phones)
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: float = 1.0) -> Motion:
         """The motion with these eyes, at its own rate, and with a head that follows their wide shifts.
 
         The eyes undo a share of the head's quick turns and all of the turns that follow them. A motion without a head gets
         one where there are wide shifts; a head of zeros turns as well. With phones, eyes listen where nobody speaks for long.
-        turning: whether the head may follow; where it may not, it stays as it is and the eyes alone make the whole shift.
+        turning: factor on the turns that follow; 0: the head stays as it is and the eyes alone make the whole shift.
         """
         frames = self.grow(len(motion) / motion.fps, seed, phones).frames
-        wide = head_turns(frames[:, 1:], self.fps) if turning else np.zeros((len(frames), 2))
+        wide = turning * head_turns(frames[:, 1:], self.fps)
         grown, turns = self._at_times(frames, motion), self._at_times(wide, motion)
         head = np.zeros((len(motion), 6), np.float32) if motion.head is None else motion.head
-        gaze = grown[:, 1:] - self.parts.compensation * quick_turns(head, motion.fps) - turns
+        undone = self.parts.compensation[roles_of(phones, len(motion), motion.fps)]
+        gaze = grown[:, 1:] - undone[:, None] * quick_turns(head, motion.fps) - turns
         eyes = np.concatenate([np.clip(grown[:, :1], 0, 1), within_reach(gaze)], axis=1)
         if not turning:
             return replace(motion, eyes=eyes.astype(np.float32))
@@ -128,7 +129,7 @@ def load_eyes(folder: Folder, threads: int) -> Eyes:
             roles=arrays["roles"],
             joins=str(settings["joins"]),
             settings=PatchSettings(int(settings["patch"]), int(settings["boundary"]), float(settings["tolerance"])),
-            compensation=float(settings["compensation"]),
+            compensation=np.broadcast_to(np.asarray(settings["compensation"], np.float64), len(ROLES)),
             manifest=manifest,
         )
     )

@@ -25,8 +25,8 @@ LIDS_NEAR = 0.2
 """Openings of the lids that are nearer than this are one."""
 AGAIN_S = 20.0
 """A unit is taken again after so long, or after half of all that fit."""
-EITHER, SPEAKING, LISTENING = 0, 1, 2
-"""Role of a recording: what its eyes did then; EITHER fits always."""
+EITHER, SPEAKING, LISTENING = ROLES = (0, 1, 2)
+"""Role of a recording, what its eyes did then, or of a moment: EITHER is that nobody knows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +116,8 @@ class ShiftTexture:
         return part
 
     def _that_fit(self, role: int) -> NDArray[np.bool_]:
-        """[U] units of a role; all where none is."""
-        fits = np.isin(self.units.roles, (role, EITHER)) | (role == EITHER)
-        return fits if fits.any() else np.ones_like(fits)
+        """[U] units of a role, of nobody knows which where none is, else all."""
+        for one in (role, EITHER):
+            if (fits := self.units.roles == one).any():
+                return np.asarray(fits)
+        return np.ones(len(self.units.roles), np.bool_)

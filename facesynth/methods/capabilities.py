@@ -108,7 +108,7 @@ class MappingEmotions(Protocol):
 class Looking(Protocol):
     """Moves eyes that know of the head."""
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: float = 1.0) -> Motion:
         """The motion with eyes that go with its head and with what is said; the head turns with wide looks, if it may."""
         ...
 

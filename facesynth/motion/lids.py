@@ -1,6 +1,8 @@
-"""Recorded lids: where they are shut, which is not where a tracker says 0."""
+"""Recorded lids: where they are shut, which is not where a tracker says 0, and where they are open, which is not 1."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,28 @@ DIP, DIP_S = 0.3, 0.5
 """A blink takes the lids down by at least this share of the opening, and up again within this time, seconds."""
 DEEPEST = 0.1
 """Share of the blinks that shut the eyes as far as they go."""
+OPEN = 0.9
+"""Quantile of a person's openings that counts as open: some rest with lids that cover a part of the eye."""
+
+
+@dataclass(frozen=True)
+class Lids:
+    """What whoever recorded a person says of lids that are shut, and of open ones."""
+
+    shut: float
+    opened: float
+
+    @classmethod
+    def of(cls, pieces: Sequence[Motion]) -> Self:
+        """Of all recordings of a person together."""
+        openings = np.concatenate([np.zeros(0), *(eyes_of(piece)[:, 0] for piece in pieces)])
+        known, shut = openings[np.isfinite(openings)], shut_level(pieces)
+        opened = float(np.quantile(known, OPEN)) if len(known) else 1.0
+        return cls(shut, opened if opened > shut + DIP else 1.0)
+
+    def opening(self, piece: Motion) -> Floats:
+        """[T, 1] opening of the lids: 0 where they are shut, 1 where they are open."""
+        return np.clip((eyes_of(piece)[:, :1].astype(np.float64) - self.shut) / (self.opened - self.shut), 0, 1)
 
 
 def shut_level(pieces: Sequence[Motion]) -> float:
@@ -24,11 +48,6 @@ def shut_level(pieces: Sequence[Motion]) -> float:
     """
     lowest = [low for piece in pieces for low in _dips(eyes_of(piece)[:, 0], piece.fps)]
     return float(np.clip(np.quantile(lowest, DEEPEST), 0, 1 - DIP)) if lowest else 0.0
-
-
-def opening_of(piece: Motion, shut: float) -> Floats:
-    """[T, 1] opening of the lids that reaches 0 where they are shut."""
-    return np.clip((eyes_of(piece)[:, :1].astype(np.float64) - shut) / (1 - shut), 0, 1)
 
 
 def eyes_of(motion: Motion) -> NDArray[np.float32]:

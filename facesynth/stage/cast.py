@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import NEUTRAL, EmotionTrack, PhoneTrack, Speech
-from facesynth.methods.capabilities import Explaining, Expressing, MappingEmotions
+from facesynth.methods.capabilities import Explaining, MappingEmotions
 from facesynth.methods.registry import able, ask, load_trained, read_option, require, require_option
 from facesynth.methods.trained import TrainedModel
+from facesynth.stage.expressed import expressed
 from facesynth.stage.request import AUTO, Part, Request
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class Cast:
     def finished(self, motion: Motion, speech: Speech, request: Request) -> Motion:
         """The mouth's motion with emotions added, or mapped to another, where that was asked for."""
         if self.expression is not None:
-            motion = require(self.expression, Expressing).express(motion, speech, seed=request.seed)
+            motion = expressed(self.expression, motion, speech, seed=request.seed)
         if self.mapper is not None and request.to_emotion is not None:
             motion = self.mapper.map_along(motion, speech, request.to_emotion, intensity=request.to_intensity)
         return motion

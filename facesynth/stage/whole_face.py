@@ -87,7 +87,7 @@ def _looking(cast: Cast, eyes: TrainedModel, motion: Motion, speech: Speech, req
     if (looking := ask(eyes, Looking)) is None:
         own = cast.options(request, speech.phones, eyes)
         return replace(motion, eyes=at_clock(eyes.synthesize(speech, seed=request.seed, **own), motion).eyes)
-    return looking.look(motion, seed=request.seed, phones=speech.phones, turning=request.head.factor > 0)
+    return looking.look(motion, seed=request.seed, phones=speech.phones, turning=request.head.factor)
 
 
 def _head_may_follow(cast: Cast, motion: Motion, request: Request) -> bool:
@@ -98,7 +98,7 @@ def _head_may_follow(cast: Cast, motion: Motion, request: Request) -> bool:
 
 def _head_led_by_eyes(motion: Motion, speech: Speech, request: Request) -> tuple[Motion, EyeMotion]:
     """The package's head, which follows the wide shifts of the package's eyes, and these eyes as an `EyeMotion`."""
-    looked = _packaged().look(motion, seed=request.seed, phones=speech.phones)
+    looked = _packaged().look(motion, seed=request.seed, phones=speech.phones, turning=request.head.gain)
     eyes = np.asarray(looked.eyes, np.float64)
     return replace(motion, head=looked.head), lambda *_: eyes
 
@@ -113,7 +113,7 @@ def _account(model: TrainedModel, speech: Speech, request: Request) -> str:
 def packaged_eyes(head: NDArray[np.floating], fps: float, phones: PhoneTrack | None, seed: int) -> NDArray[np.float64]:
     """An `EyeMotion` of the model that comes with the package, beside a head that does not follow it."""
     still = Motion(np.zeros((len(head), 1), np.float32), fps, Layout("curves", ("still",)), head.astype(np.float32))
-    eyes = _packaged().look(still, seed=seed, phones=phones, turning=False).eyes
+    eyes = _packaged().look(still, seed=seed, phones=phones, turning=0.0).eyes
     return np.zeros((0, 3)) if eyes is None else eyes.astype(np.float64)
 
 

@@ -9,6 +9,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.eyes import at_rest
 from facesynth.inference.gaze import REACH_RAD, facing
 from facesynth.inference.motion import Motion
+from facesynth.inference.shift_patches import EITHER
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.patch_size import knee, patch_size
 from facesynth.methods.eyes.recordings import compensation_in, sharpened
@@ -71,7 +72,7 @@ def test_eyes_hold_their_place_while_the_head_moves(model):
     still = at_rest(tiny_layout(), 1200, FPS)
     head = recording(20.0).head
     moved = Motion(still.frames, FPS, still.layout, head)
-    share = model.facts["compensation"]
+    share = model.facts["compensation"][EITHER]
     assert share == pytest.approx(0.7, abs=0.1)
     with_head, without = model.look(moved).eyes, model.look(still).eyes
     undone = with_head[:, 1:] - without[:, 1:]
@@ -93,9 +94,10 @@ def test_where_somebody_looks_is_the_same_whether_the_head_may_follow_or_not():
     wide = recording()
     far = learnt(Motion(wide.frames, FPS, wide.layout, None, wide.eyes * (1, 2, 2)))
     still = at_rest(tiny_layout(), 1800, FPS)
-    followed, held = far.look(still), far.look(still, turning=False)
+    followed, held = far.look(still), far.look(still, turning=0.0)
     assert held.head is None
     assert np.degrees(np.abs(followed.head[:, 1])).max() > 2
+    assert far.look(still, turning=2.0).head == pytest.approx(2 * followed.head, abs=1e-6)
     within = np.hypot(*(held.eyes[:, 1:] / REACH_RAD).T) < 0.99
     within &= np.hypot(*(followed.eyes[:, 1:] / REACH_RAD).T) < 0.99
     assert within.mean() > 0.5

@@ -15,6 +15,7 @@ from facesynth.face.solve.blendshapes import MarkerBasis, solve_markers
 from facesynth.face.solve.closures import MOUTH, with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.arkit_names import ARKIT_NAMES
@@ -35,7 +36,7 @@ def amplified(weights: ArrayLike, gain: float, lips: LipGap) -> NDArray[np.float
         raise FacesynthError(f"a gain of the mouth must be 0 (still) or a positive factor; got {gain}")
     values = np.clip(np.asarray(weights, np.float64), 0, 1)
     if gain > 1:
-        free = np.clip((lips.opening_mm(values) - SHUT_MM) / (OPEN_MM - SHUT_MM), 0, 1)
+        free = 1 - nearly_shut(lips.opening_mm(values))
         values[:, MOUTH] *= 1 + (gain - 1) * free[:, None]
         values[:, [JAW, CLOSE]] /= np.maximum(values[:, [JAW, CLOSE]].max(axis=1, keepdims=True), 1.0)
         moved = free > 0
@@ -43,6 +44,11 @@ def amplified(weights: ArrayLike, gain: float, lips: LipGap) -> NDArray[np.float
         return np.clip(values, 0, 1)
     values[:, MOUTH] *= gain
     return values
+
+
+def nearly_shut(opening_mm: ArrayLike) -> NDArray[np.float64]:
+    """[T] 1 where lips [T] are shut, 0 where they are free, between the two in between."""
+    return 1 - np.clip((np.asarray(opening_mm, np.float64) - SHUT_MM) / (OPEN_MM - SHUT_MM), 0, 1)
 
 
 # What mouthClose closes beyond the jaw, the shapes that part the lips give way to: with m = excess · |slope of mouthClose| and
@@ -139,6 +145,15 @@ def animate(
     weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
     tip = np.clip(tongue_track(TIP_UP, phones, len(motion), motion.fps), 0, 1)
     return FaceAnimation(rig.names, np.clip(weights, 0, 1), head, gaze, tip, motion.fps, residual)
+
+
+def on_head(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> Motion:
+    """A motion of points, or of curves with ARKit names, as the 52 weights of the built-in head, turned about its pivot."""
+    _check_whole(motion)
+    weights, _ = _weights(motion, rig, phones)
+    head = None if motion.head is None else _head_on(rig, motion, 1.0).astype(np.float32)
+    frames = np.clip(weights, 0, 1).astype(np.float32)
+    return Motion(frames, motion.fps, Layout("curves", ARKIT_NAMES), head, motion.eyes)
 
 
 def _check_whole(motion: Motion) -> None:

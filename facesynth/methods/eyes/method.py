@@ -16,7 +16,7 @@ from facesynth.inference.eyes import ANYWHERE, SHIFTS, Parts
 from facesynth.inference.eyes import Eyes as Runtime
 from facesynth.inference.motion import Motion
 from facesynth.inference.patches import PatchSettings, PatchTexture
-from facesynth.inference.shift_patches import EITHER, ShiftTexture
+from facesynth.inference.shift_patches import EITHER, ROLES, ShiftTexture
 from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.methods.capabilities import Account
 from facesynth.methods.eyes.capabilities import CAPABILITIES
@@ -25,7 +25,7 @@ from facesynth.methods.eyes.patch_size import SHUT, patch_size
 from facesynth.methods.eyes.recordings import at_rate, compensation_in, texture_of, whole_pieces
 from facesynth.methods.method import Method
 from facesynth.methods.registry import register
-from facesynth.motion.lids import shut_level
+from facesynth.motion.lids import Lids
 
 AUTO = "auto"
 """In place of a number that is found in the recordings."""
@@ -37,6 +37,8 @@ BETWEEN_S = 1.0
 FEWEST_UNITS, HELD, HELD_BLINKING = 20, 0.5, 0.8
 """So many shifts with the rest after them, and so much of the recordings in them, are enough to join patches at shifts; more of
 recordings with blinks, which are rarer where nothing shifts: what is left out would change their rate."""
+UNSEEN = 0.6
+"""Share of the head's quick turns that eyes undo where none of the recordings shows a head."""
 FROZEN = 1e-3
 """Deviation of lids, and of gaze (rad), under which nothing moves."""
 
@@ -58,9 +60,11 @@ class Eyes(Method):
     tolerance : float
         epsilon of eq. 3.4: how unlike boundary zones of patches that follow each other may be (anywhere).
     compensation : float or "auto"
-        Share of the head's quick turns that the eyes undo; auto: what the recorded eyes undo.
+        Share of the head's quick turns that the eyes undo; auto: what the recorded eyes undo, 0.6 where no head was recorded.
     smoothed_s : float
         Over how long the recorded gaze was averaged, which is undone; 0: not at all.
+    most_blinks : float or "auto"
+        Of lent lids that blink more often a minute, blinks are left out by chance; auto: none is.
     """
 
     frames: Tensor
@@ -78,14 +82,15 @@ class Eyes(Method):
         tolerance: float = 0.2,
         compensation: float | str = AUTO,
         smoothed_s: float = 0.0,
+        most_blinks: float | str = AUTO,
     ) -> None:
         super().__init__()
-        numbers = {"patch_s": patch_s, "compensation": compensation}
+        numbers = {"patch_s": patch_s, "compensation": compensation, "most_blinks": most_blinks}
         wrong = [name for name, value in numbers.items() if value != AUTO and not (_is_number(value) and float(value) >= 0)]
         if wrong or not 0 < boundary < 1 or min(tolerance, smoothed_s) < 0:
             raise FacesynthError(
-                "eyes wants patch_s and compensation of 0 or above or auto, a boundary between 0 and 1, and no negative "
-                "tolerance or smoothed_s; got " + ", ".join(f"{name}={value}" for name, value in self.config.items())
+                "eyes wants patch_s, compensation and most_blinks of 0 or above or auto, a boundary between 0 and 1, and "
+                "no negative tolerance or smoothed_s; got " + ", ".join(f"{name}={value}" for name, value in self.config.items())
             )
         if joins not in (SHIFTS, ANYWHERE, AUTO):
             raise FacesynthError(f"eyes wants joins {SHIFTS}, {ANYWHERE} or {AUTO}; got {joins!r}")
@@ -124,24 +129,26 @@ class Eyes(Method):
         parts = [_pieces_of(motion) for motion in motions]
         pieces = _enough([piece for part in parts for piece in part], len(motions), where)
         done = np.repeat(np.full(len(motions), EITHER) if roles is None else np.asarray(roles), [len(part) for part in parts])
-        gain, found = self._gain(pieces), compensation_in(pieces)
-        shut, smoothed_s = shut_level(pieces), float(self.config["smoothed_s"])
-        textures = [texture_of(piece, shut, found, smoothed_s) for piece in pieces]
+        shown, found = Lids.of(pieces), [_found(pieces, done, role) for role in ROLES]
+        gains, smoothed_s = [self._gain(one) for one in found], float(self.config["smoothed_s"])
+        held = [found[role] or 0.0 for role in done]
+        textures = [texture_of(piece, shown, share, smoothed_s) for piece, share in zip(pieces, held, strict=True)]
         self.fps = pieces[0].fps
         if lids is not None:
             lent = _enough([piece for motion in lids for piece in _pieces_of(motion)], len(lids), "the lent lids")
-            textures = with_lids(textures, [at_rate(piece, self.fps) for piece in lent], seed)
+            textures = with_lids(textures, [at_rate(piece, self.fps) for piece in lent], seed, self._most_blinks())
         if np.concatenate(textures).std(axis=0).max() < FROZEN:
             raise FacesynthError(f"the eyes of {where} are frozen: no lid and no gaze moves; take another corpus")
         self._keep(textures, done.astype(np.int64), where)
-        self.facts |= {"compensation": gain, "compensation_found": found, "shut_level": shut, "pieces": len(textures)}
+        self.facts |= {"compensation": gains, "compensation_found": found, "pieces": len(textures)}
+        self.facts |= {"lids_shut": shown.shut, "lids_open": shown.opened}
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """Eyes for a head that is still, and the head as far as their wide shifts turn it."""
         self.refuse(options)
         return self.runtime().synthesize(speech, seed=seed)
 
-    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: bool = True) -> Motion:
+    def look(self, motion: Motion, *, seed: int = 0, phones: PhoneTrack | None = None, turning: float = 1.0) -> Motion:
         """The motion with eyes that go with its head, which wide shifts turn; they listen where nobody speaks for long."""
         return self.runtime().look(motion, seed=seed, phones=phones, turning=turning)
 
@@ -156,13 +163,18 @@ class Eyes(Method):
         if self._runtime is None:
             settings = PatchSettings(*(self.facts[name] for name in ("patch", "boundary", "tolerance")))
             frames, starts, roles = (tensor.detach().cpu().numpy() for tensor in (self.frames, self.starts, self.roles))
-            joins, gain = str(self.facts["joins"]), float(self.facts["compensation"])
-            self._runtime = Runtime(Parts(layout, self.fps, self.emotions, frames, starts, roles, joins, settings, gain))
+            joins, gains = str(self.facts["joins"]), np.asarray(self.facts["compensation"], np.float64)
+            self._runtime = Runtime(Parts(layout, self.fps, self.emotions, frames, starts, roles, joins, settings, gains))
         return self._runtime
 
-    def _gain(self, pieces: Sequence[Motion]) -> float:
+    def _gain(self, found: float | None) -> float:
+        """What is undone of a head, given what the recordings show of it."""
         given = self.config["compensation"]
-        return compensation_in(pieces) if given == AUTO else float(given)
+        return (UNSEEN if found is None else found) if given == AUTO else float(given)
+
+    def _most_blinks(self) -> float | None:
+        most = self.config["most_blinks"]
+        return None if most == AUTO else float(most)
 
     def _sizes(self, textures: list[Floats], joins: str, where: str) -> tuple[int, int]:
         """Patch and boundary, frames."""
@@ -201,6 +213,12 @@ class Eyes(Method):
         blinks = bool((texture.frames[:, 0] < SHUT).any())
         enough = count >= FEWEST_UNITS and texture.held >= (HELD_BLINKING if blinks else HELD)
         return asked if asked != AUTO else SHIFTS if enough else ANYWHERE
+
+
+def _found(pieces: Sequence[Motion], done: NDArray[np.int64], role: int) -> float | None:
+    """Share of the head's turns that eyes undo in recordings of a role, of all where none is; None where none shows a head."""
+    mine = [piece for piece, one in zip(pieces, done, strict=True) if one == role] or pieces
+    return compensation_in(mine) if any(piece.head is not None for piece in mine) else None
 
 
 def _pieces_of(motion: Motion) -> list[Motion]:

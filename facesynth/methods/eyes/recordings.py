@@ -10,7 +10,7 @@ from facesynth.inference.arrays import Floats
 from facesynth.inference.gaze import quick, quick_turns
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import runs
-from facesynth.motion.lids import eyes_of, opening_of
+from facesynth.motion.lids import Lids, eyes_of
 
 AWAKE = 0.8
 """Lids that are open so far show the eye as it is; under them trackers guess."""
@@ -47,13 +47,13 @@ def compensation_in(pieces: Sequence[Motion]) -> float:
     return float(np.clip(-crossed / own, 0, 1)) if own > count * MOVING_RAD**2 else 0.0
 
 
-def texture_of(piece: Motion, shut: float, compensation: float, smoothed_s: float) -> Floats:
-    """[T, 3] a piece as it is grown from: opening that reaches 0 in a blink; gaze without smoothing.
+def texture_of(piece: Motion, lids: Lids, compensation: float, smoothed_s: float) -> Floats:
+    """[T, 3] a piece as it is grown from: opening from 0 in a blink to 1; gaze without smoothing.
 
     smoothed_s: over how long the gaze was averaged when it was recorded.
     """
     gaze = sharpened(held_gaze(piece, compensation), round(smoothed_s * piece.fps))
-    return np.concatenate([opening_of(piece, shut), gaze], axis=1)
+    return np.concatenate([lids.opening(piece), gaze], axis=1)
 
 
 def held_gaze(piece: Motion, compensation: float) -> Floats:
