@@ -167,22 +167,22 @@ class AnimeGraph(Method):
         """Frames [T, C] as components times metric [T, D], whose squared distance is the mean over the channels."""
         return self.components.encode(frames) @ self.components.metric
 
+    # Hundreds of small clusterings and systems: where another program held one of two processors, two threads that
+    # wait for each other took 55 s of processor time for a fit that takes 6 s with one thread here.
+    @threadpool_limits.wrap(limits=1)
     def _fit_maps(self, takes: Sequence[Take], seed: int) -> None:
         """A map for every ordered pair of emotions; why there is none is kept for those who ask for it."""
         self.facts["no_map"], fitted = {}, []
         pairs = list(permutations(self.emotions, 2))
         counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
         self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
-        # Hundreds of small clusterings and systems: where another program held one of two processors, two threads that
-        # wait for each other took 55 s of processor time for a fit that takes 6 s with one thread here.
-        with threadpool_limits(1):
-            for pair in track(pairs, "emotion maps"):
-                try:
-                    require_pairs(self.split, counts[pair], *pair)
-                except FacesynthError as error:
-                    self.facts["no_map"][" ".join(pair)] = str(error)
-                else:
-                    fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
+        for pair in track(pairs, "emotion maps"):
+            try:
+                require_pairs(self.split, counts[pair], *pair)
+            except FacesynthError as error:
+                self.facts["no_map"][" ".join(pair)] = str(error)
+            else:
+                fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
         self.maps.fill(fitted, self.split.emotional)
 
     def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:

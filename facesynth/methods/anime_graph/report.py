@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from facesynth.inference.arrays import Floats
 from facesynth.inference.closures import keep_shut
@@ -62,6 +63,7 @@ class MapTrial:
     layout: Layout
     centres: int = 250
 
+    @threadpool_limits.wrap(limits=1)  # as for learning maps
     def score(self, source: str, target: str, *, folds: int | None = None, seed: int = 0) -> MapScore:
         """Leave sentences out, one by one or in so many `folds`, and map them by what the others teach."""
         pairs, samples = self._pairs(source, target)
