@@ -26,7 +26,8 @@ from facesynth.face.texture.mesh import ringed_mesh
 from facesynth.face.texture.warp import PiecewiseAffineWarp
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods import registry
-from facesynth.methods.emotion.svm import Svm, SvmSettings
+from facesynth.methods.emotion.discriminant import fit_discriminant
+from facesynth.methods.emotion.svm import SvmSettings, fit_svm
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.windows import Batch
 from facesynth.motion.ica import Ica
@@ -53,7 +54,7 @@ def rbf_map():
 
 
 def svm(kernel):
-    return Svm.fit(FRAMES.double().numpy(), np.arange(40) % 3, SvmSettings(kernel))
+    return fit_svm(FRAMES.double().numpy(), np.arange(40) % 3, SvmSettings(kernel))
 
 
 def point_loss():
@@ -99,6 +100,7 @@ PARTS = {
     "point loss": lambda rig: point_loss(),
     "mesh distance": lambda rig: deformed(rig, MeshDistanceDeformer),
     "regions": lambda rig: deformed(rig, RegionDeformer),
+    "discriminant": lambda rig: (fit_discriminant(FRAMES.double().numpy(), np.arange(40) % 3), (FRAMES,)),
     "linear svm": lambda rig: (svm("linear"), (FRAMES,)),
     "radial svm": lambda rig: (svm("radial"), (FRAMES,)),
 }

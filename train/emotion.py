@@ -54,8 +54,9 @@ def main() -> None:
 def show(result: Recognition, *, confusion: bool = False) -> None:
     """One line, and the confusion matrix if wanted."""
     settings = result.settings
-    features = settings.features if settings.features == "voice" else f"paper, {settings.coefficients} coefficients"
-    print(f"{result.split:14s} {features}, {settings.kernel}: accuracy {result.accuracy:.3f}, "
+    features = f"paper, {settings.coefficients} coefficients" if settings.features == "paper" else settings.features
+    classifier = f"svm, {settings.kernel}" if settings.classifier == "svm" else settings.classifier
+    print(f"{result.split:14s} {features}, {classifier}: accuracy {result.accuracy:.3f}, "
           f"unweighted recall {result.unweighted_recall:.3f}")  # fmt: skip
     for name, row in zip(result.emotions, result.confusion.tolist(), strict=True) if confusion else ():
         print(f"    {name:>12s} " + " ".join(f"{count:4d}" for count in row))

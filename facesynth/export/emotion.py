@@ -6,13 +6,14 @@ import numpy as np
 
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
+from facesynth.export.phones import phone_network_graph
 from facesynth.export.speech_graphs import cepstrum_graph, mel_cepstra_graph
 from facesynth.graph_builder import Builder
 from facesynth.inference.emotion_track import HOP_S, WINDOW_S
 from facesynth.inference.pitch import RATE
 from facesynth.methods.emotion.detector import EmotionDetector
+from facesynth.methods.emotion.pairwise import DEGREE
 from facesynth.methods.emotion.probabilities import CLOSEST_TO_CERTAIN
-from facesynth.methods.emotion.svm import DEGREE
 from facesynth.methods.parts import part
 from facesynth.speech.mel_cepstra import MelCepstra
 
@@ -20,13 +21,15 @@ from facesynth.speech.mel_cepstra import MelCepstra
 def emotion_content(detector: EmotionDetector) -> Content:
     """Everything that the runtime needs of a trained detector."""
     front = mel_cepstra_graph(detector.front) if isinstance(detector.front, MelCepstra) else cepstrum_graph(detector.front, RATE)
+    heard = (phone_network_graph(),) if detector.settings.features == "voice_and_phone_net" else ()
     return Content(
-        graphs=(front, machine_graph(detector)),
+        graphs=(front, machine_graph(detector), *heard),
         settings={
             "features": detector.settings.features,
             "feature_count": len(detector.shift),
             "normalise": detector.settings.normalise,
-            "kernel": detector.settings.kernel,
+            "classifier": detector.settings.classifier,
+            "kernel": detector.machine.kernel,
         },
         latency={
             "look_ahead_s": WINDOW_S,
@@ -66,7 +69,7 @@ def machine_graph(detector: EmotionDetector) -> Graph:
     shift, spread = detector.shift.numpy(), 1 / np.maximum(detector.scale.numpy(), 1e-9)
     return Graph(
         "machine",
-        "support vector machine: pairwise margins, Platt's sigmoids, coupled probabilities; the decision is by votes",
+        "a classifier of pairs: margins, Platt's sigmoids, coupled probabilities; the decision is by votes",
         b.model(),
         (Port("features", "float64", ("batch", width), "see settings.features"),),
         outputs,

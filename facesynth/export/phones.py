@@ -21,12 +21,12 @@ def export_phones(folder: str | Path, weights: Weights = "float32") -> dict[str,
     latency = {"look_ahead_s": WHOLE.look_ahead_s, "about": "of whole sounds; a stream states its own"}
     alphabet = alphabet_of(read_archive().tokens)
     settings = {"tokens": list(alphabet.tokens), "phones_of_tokens": list(map(list, alphabet.phones)), "notice": NOTICE}
-    content = Content((_graph(),), settings, latency, RATE)
+    content = Content((phone_network_graph(),), settings, latency, RATE)
     data = {"performer": "unknown", "licences": ["Apache-2.0 (weights)"], "consents": ["not stated by hama 1.7.0"]}
     return write_folder(folder, Subject("phones", data, None, None, ()), stored_as(content, weights))
 
 
-def _graph() -> Graph:
+def phone_network_graph() -> Graph:
     """The graph, which is compared with the module of torch."""
     network = phone_network()
     outputs = (

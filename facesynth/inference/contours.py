@@ -43,6 +43,8 @@ class Contours:
     """[T] true for at least five frames."""
     colour: Floats
     """[T, 8] centroid, slopes and roll-off of the spectrum, its flux and zero crossings."""
+    begin_s: float
+    """Where in the sound the first frame lies, seconds."""
 
 
 def contours(audio: NDArray[np.float32], front: FrontEnd) -> Contours:
@@ -51,7 +53,7 @@ def contours(audio: NDArray[np.float32], front: FrontEnd) -> Contours:
     power, bands, cepstra = (found[0] for found in front(audio=audio[None]))
     level = np.log10(power.sum(axis=1) + 10 * SMALLEST_POWER)
     loud = np.flatnonzero(level > level.max() - QUIETER_DB / 10)
-    kept = slice(loud[0], max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
+    kept = slice(int(loud[0]), max(loud[-1] + 1, loud[0] + LEAST_FRAMES))
     sound = audio.astype(np.float64)
     pitch, periodicity = pitch_of(_frames(sound, PITCH_WINDOW)[kept])
     voiced = periodicity > VOICED
@@ -65,6 +67,7 @@ def contours(audio: NDArray[np.float32], front: FrontEnd) -> Contours:
         periodicity,
         voiced,
         _colour(_frames(sound, WINDOW)[kept], power[kept], bands[kept]),
+        kept.start * HOP / RATE,
     )
 
 

@@ -17,10 +17,12 @@ from .folder import MANIFEST, Folder
 from .graphs import Graph, Part
 from .sound import checked_hz, resample
 from .speech import EmotionTrack
-from .voice import voice_features
+from .voice import heard_voice_features, voice_features
 
-FRONT_ENDS = {"voice": "mel_cepstra", "paper": "cepstrum"}
+FRONT_ENDS = {"voice_and_phone_net": "mel_cepstra", "voice": "mel_cepstra", "paper": "cepstrum"}
 """Kinds of features, and the graphs that they begin with."""
+PHONES = "phones"
+"""The graph of the phone network, which the first of them needs too."""
 LEAST_OF_A_SPEAKER = 4
 """Recordings from which a speaker's own mean and spread are taken."""
 SMALLEST_SPREAD = 1e-9
@@ -62,7 +64,8 @@ class ReaderSettings:
     """How a detector listens."""
 
     features: str
-    """`voice` (statistics of timbre, pitch, dynamics and rhythm) or `paper` (three moments and the cepstrum)."""
+    """`voice` (statistics of timbre, pitch, dynamics and rhythm), `voice_and_phone_net` (the same and statistics of the phone
+    network's layers) or `paper` (three moments and the cepstrum)."""
     normalise: bool
     """Whether a speaker is compared with that speaker's own average."""
     rate: int
@@ -73,7 +76,8 @@ class EmotionReader:
     """A trained detector, whether its parts are graphs of a folder or modules of torch.
 
     Parts are called with named arrays: `front(audio [1, S])` gives power, mel bands and cepstra of a voice, or the paper's
-    cepstrum [1, n]; `machine(features [N, F])` gives margins [N, pairs], probabilities [N, K] and the decision [N].
+    cepstrum [1, n]; `machine(features [N, F])` gives margins [N, pairs], probabilities [N, K] and the decision [N];
+    `network`, where the features ask for it, is as in `Ear`.
     """
 
     def __init__(
@@ -83,13 +87,17 @@ class EmotionReader:
         front: Part,
         machine: Part,
         manifest: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        network: Part | None = None,
     ) -> None:
         self.emotions, self.settings, self.rate, self.manifest = emotions, settings, settings.rate, manifest
-        self._front, self._machine = front, machine
+        self._front, self._machine, self._network = front, machine, network
 
     def features(self, audio: ArrayLike, rate: int) -> Floats:
         """Audio [S] to features [F]; FacesynthError where it is constant or too short."""
         sound = resample(checked_piece(audio), rate, self.rate)
+        if self._network is not None:
+            return heard_voice_features(sound, self._front, self._network)
         if self.settings.features == "voice":
             return voice_features(sound, self._front)
         if not len(sound) or float(np.ptp(sound)) < STILL:
@@ -180,10 +188,11 @@ def load_detector(folder: Folder, threads: int) -> EmotionReader:
     """The detector that was exported to a folder."""
     manifest, features = folder.manifest, folder.settings["features"]
     if features not in FRONT_ENDS:
-        raise FacesynthError(f"{folder.path / MANIFEST}: features is {features!r}; wanted {' or '.join(FRONT_ENDS)}")
+        raise FacesynthError(f"{folder.path / MANIFEST}: features is {features!r}; wanted {', '.join(FRONT_ENDS)}")
     settings = ReaderSettings(features, bool(folder.settings["normalise"]), int(manifest["sample_rate"]))
     front, machine = Graph(folder, FRONT_ENDS[features], threads), Graph(folder, "machine", threads)
-    return EmotionReader(tuple(manifest["emotions"]), settings, front, machine, manifest)
+    network = Graph(folder, PHONES, threads) if features == "voice_and_phone_net" else None
+    return EmotionReader(tuple(manifest["emotions"]), settings, front, machine, manifest, network=network)
 
 
 class EmotionStream:

@@ -4,11 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats
-from .contours import Contours, FrontEnd, contours
+from .contours import HOP, RATE, Contours, FrontEnd, contours
+from .ear import FRAMES_PER_S, Ear
+from .graphs import Part
 
 PERCENTILES = (10, 50, 90)
 STRETCHES = 5
 """Into how many stretches an utterance is cut to see where it rises and falls."""
+LAYERS = slice(0, 3)
+"""Hidden layers of the phone network that emotions are read from; the last one tells phones apart and little else."""
 MODULATION_HZ = ((0.5, 2), (2, 4), (4, 8), (8, 16), (16, 32))
 
 
@@ -17,9 +21,26 @@ def voice_features(audio: NDArray[np.float32], front: FrontEnd) -> Floats:
 
     FacesynthError where it is constant or too short.
     """
+    return _statistics(contours(audio, front))
+
+
+def heard_voice_features(audio: NDArray[np.float32], front: FrontEnd, network: Part) -> Floats:
+    """The same and [864] what the phone network makes of the voice: [1051].
+
+    The network was trained to hear phones of anybody, and what its layers take into account for that (who speaks, how
+    high, how tense) is what differs between emotions: mean and spread of LAYERS while somebody speaks.
+    """
     voice = contours(audio, front)
-    groups = (_timbre(voice), _melody(voice), _dynamics(voice), _colour(voice), _rhythm(voice), _course(voice))
-    return np.concatenate(groups)
+    hidden = Ear(network).hear(audio)[1][:, LAYERS]
+    begin = round(voice.begin_s * FRAMES_PER_S)
+    count = max(1, round(len(voice.level) * HOP / RATE * FRAMES_PER_S))
+    spoken = hidden[begin : begin + count].astype(np.float64)
+    pooled = np.concatenate([spoken.mean(axis=0), spoken.std(axis=0)], axis=1).ravel()
+    return np.concatenate([_statistics(voice), pooled])
+
+
+def _statistics(voice: Contours) -> Floats:
+    return np.concatenate([_timbre(voice), _melody(voice), _dynamics(voice), _colour(voice), _rhythm(voice), _course(voice)])
 
 
 def _timbre(voice: Contours) -> Floats:

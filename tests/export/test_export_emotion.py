@@ -17,16 +17,17 @@ def pair(emotion_file, exported):
 def test_features_probabilities_and_decisions_are_those_of_torch(pair, speeches):
     detector, runtime = pair
     for speech in speeches:
-        features = detector.features(speech.audio, 16000)
-        assert np.allclose(runtime.features(speech.audio, 16000), features, rtol=1e-6, atol=1e-9)
+        wanted_features, features = (one.features(speech.audio, 16000) for one in (detector, runtime))
+        assert np.allclose(features[:187], wanted_features[:187], rtol=1e-6, atol=1e-9)
+        assert np.allclose(features[187:], wanted_features[187:], atol=1e-3)  # the network works in float32
         wanted, got = detector.detect(speech.audio, 16000), runtime.detect(speech.audio, 16000)
         assert got.emotion == wanted.emotion
-        assert got.probabilities == pytest.approx(wanted.probabilities, rel=1e-5)
+        assert got.probabilities == pytest.approx(wanted.probabilities, abs=1e-3)
 
 
 @pytest.mark.parametrize("kernel", ["linear", "polynomial", "radial"])
 def test_the_papers_features_and_every_kernel(small_corpus, speeches, tmp_path, kernel):
-    detector = EmotionDetector(DetectorSettings(features="paper", coefficients=40, kernel=kernel)).fit(
+    detector = EmotionDetector(DetectorSettings(features="paper", coefficients=40, classifier="svm", kernel=kernel)).fit(
         clips_of_corpus(small_corpus)
     )
     detector.save(tmp_path / "paper.safetensors")
@@ -39,17 +40,20 @@ def test_the_papers_features_and_every_kernel(small_corpus, speeches, tmp_path, 
         assert got.probabilities == pytest.approx(wanted.probabilities, rel=1e-4)
 
 
-def test_a_track_is_that_of_torch(pair, long_sound):
-    detector, runtime = pair
-    wanted = detector.detect_track(*long_sound, window_s=1.0, hop_s=0.25)
-    got = runtime.detect_track(*long_sound, window_s=1.0, hop_s=0.25)
+def test_a_track_is_that_of_torch(pair, long_sound, track_of_the_whole):
+    wanted, got = pair[0].detect_track(*long_sound, window_s=1.0, hop_s=0.25), track_of_the_whole
     assert got.labels == wanted.labels
     assert np.allclose(got.ends_s, wanted.ends_s)
 
 
-@settings(max_examples=8, deadline=None)
+@pytest.fixture(scope="module")
+def track_of_the_whole(pair, long_sound):
+    return pair[1].detect_track(*long_sound, window_s=1.0, hop_s=0.25)
+
+
+@settings(max_examples=5, deadline=None)
 @given(sizes=st.lists(st.integers(1, 30000), min_size=1, max_size=8))
-def test_pieces_of_any_size_give_the_track_of_the_whole(pair, long_sound, sizes):
+def test_pieces_of_any_size_give_the_track_of_the_whole(pair, long_sound, track_of_the_whole, sizes):
     sound, rate = long_sound
     stream, at = pair[1].stream(window_s=1.0, hop_s=0.25), 0
     for size in [*sizes, len(sound)]:
@@ -57,7 +61,7 @@ def test_pieces_of_any_size_give_the_track_of_the_whole(pair, long_sound, sizes)
             assert end_s <= (min(at + size, len(sound))) / rate + 1e-9
             assert sum(probabilities.values()) == pytest.approx(1)
         at += size
-    got, wanted = stream.finish(), pair[1].detect_track(sound, rate, window_s=1.0, hop_s=0.25)
+    got, wanted = stream.finish(), track_of_the_whole
     assert (got.labels, got.ends_s.tolist()) == (wanted.labels, wanted.ends_s.tolist())
 
 
@@ -69,13 +73,13 @@ def test_what_is_wrong_is_named(pair):
         runtime.detect(np.zeros(16000, np.float32), 16000)
     with pytest.raises(FacesynthError, match="50 ms long"):
         runtime.detect(np.zeros(800, np.float32), 16000)
-    with pytest.raises(FacesynthError, match=r"wanted float64 \['batch', 187\]"):
+    with pytest.raises(FacesynthError, match=r"wanted float64 \['batch', 1051\]"):
         runtime(np.zeros((1, 5)))
     with pytest.raises(FacesynthError, match="no sound was pushed"):
         runtime.stream().finish()
 
 
-@pytest.mark.parametrize(("weights", "harm", "size"), [("float16", 0.005, 0.4), ("int8", 0.25, 0.25)])
+@pytest.mark.parametrize(("weights", "harm", "size"), [("float16", 0.03, 0.6), ("int8", 0.25, 0.4)])
 def test_fewer_bits_are_smaller_and_the_harm_is_small(pair, emotion_file, exported, speeches, weights, harm, size):
     exact, smaller = pair[1], load(exported(emotion_file, weights))
     for speech in speeches:

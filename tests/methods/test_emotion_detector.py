@@ -5,9 +5,12 @@ import torch
 from scipy.fft import dct
 
 from facesynth.inference.contours import contours
+from facesynth.inference.ear import STEP
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.voice import heard_voice_features
 from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
 from facesynth.methods.emotion.tables import recognise
+from facesynth.methods.model_file import read_header, write_model
 from facesynth.methods.parts import part
 from facesynth.speech.audio import resample
 from facesynth.speech.cepstrum import RealCepstrum
@@ -46,12 +49,24 @@ def test_pitch_of_a_buzz():
     assert 180 < 100 * 2 ** np.median(found.pitch[found.voiced]) < 240
 
 
-def test_voice_features_do_not_depend_on_the_level():
-    sound, features = voice("calm", 1), EmotionDetector().features
+@pytest.mark.parametrize(("kind", "count"), [("voice", 187), ("voice_and_phone_net", 187 + 2 * 3 * 144)])
+def test_voice_features_do_not_depend_on_the_level(kind, count):
+    sound, features = voice("calm", 1), EmotionDetector(DetectorSettings(kind)).features
     loud, soft = features(sound, RATE), features(sound * np.float32(0.5), RATE)
-    assert loud.shape == (187,)
+    assert loud.shape == (count,)
     rhythm_and_more = np.abs(loud - soft) / (np.abs(loud) + 0.1)
     assert np.median(rhythm_and_more) < 1e-3
+
+
+def test_layers_of_the_phone_network_are_pooled_where_somebody_speaks():
+    def network(*, audio):
+        sounds = np.array([np.abs(piece).max() > 1e-3 for piece in np.array_split(audio[0], 1 + audio.shape[1] // STEP)])
+        layers = np.tile(sounds[:, None, None] * np.arange(1.0, 5.0)[:, None], (1, 1, 2)).astype(np.float32)
+        return [np.zeros((1, len(layers), 3), np.float32), layers[None]]
+
+    sound = np.concatenate([np.zeros(8000, np.float32), voice("calm", 1), np.zeros(32000, np.float32)])
+    pooled = heard_voice_features(sound, part(MelCepstra(), torch.device("cpu")), network)[187:].reshape(3, 2, 2)
+    np.testing.assert_allclose(pooled[:, 0], [[1, 1], [2, 2], [3, 3]], rtol=0.12)  # of all frames it would be a quarter
 
 
 def test_paper_features_are_moments_and_cepstrum():
@@ -76,12 +91,14 @@ def test_mel_bands_and_cepstra_are_those_of_the_formulas():
     np.testing.assert_allclose(cepstra, dct(bands, norm="ortho", axis=1)[:, :20], atol=1e-4)
 
 
-@pytest.mark.parametrize("features", ["voice", "paper"])
-def test_knows_unseen_recordings(clips, features):
-    detector = EmotionDetector(DetectorSettings(features, 50)).fit(clips)
+@pytest.mark.parametrize(
+    ("features", "classifier"), [("voice_and_phone_net", "discriminant"), ("voice", "svm"), ("paper", "svm")]
+)
+def test_knows_unseen_recordings(clips, features, classifier):
+    detector = EmotionDetector(DetectorSettings(features, 50, classifier)).fit(clips)
     for mood in MOODS:
         heard = [detector.detect(voice(mood, 1000 + k), RATE) for k in range(5)]
-        assert sum(r.emotion == mood for r in heard) >= (5 if features == "voice" else 3)
+        assert sum(r.emotion == mood for r in heard) >= (3 if features == "paper" else 5)
         assert all(sum(r.probabilities.values()) == pytest.approx(1) for r in heard)
 
 
@@ -120,7 +137,18 @@ def test_save_and_load(detector, tmp_path):
     again = EmotionDetector.load(tmp_path / "detector.safetensors")
     sound = voice("calm", 42)
     assert again.detect(sound, RATE) == detector.detect(sound, RATE)
-    assert isinstance(again(torch.zeros(2, 187)), torch.Tensor)
+    assert isinstance(again(torch.zeros(2, 1051)), torch.Tensor)
+
+
+def test_files_from_before_there_was_a_choice_of_classifiers_are_read(clips, tmp_path):
+    detector = EmotionDetector(DetectorSettings("paper", 50, "svm")).fit(clips)
+    detector.save(tmp_path / "now.safetensors")
+    header = read_header(tmp_path / "now.safetensors", what="an emotion detector")
+    config = {key: value for key, value in header["config"].items() if key not in ("classifier", "shrinkage")}
+    write_model(tmp_path / "before.safetensors", detector, {**header, "config": config})
+    again = EmotionDetector.load(tmp_path / "before.safetensors")
+    assert again.settings.classifier == "svm"
+    assert again.detect(clips[0].audio, RATE) == detector.detect(clips[0].audio, RATE)
 
 
 def test_bad_input_is_one_clear_line(detector, clips, tmp_path):
@@ -136,6 +164,8 @@ def test_bad_input_is_one_clear_line(detector, clips, tmp_path):
         EmotionDetector().detect(voice("calm", 0), RATE)
     with pytest.raises(FacesynthError, match="feature set"):
         EmotionDetector(DetectorSettings("fancy"))
+    with pytest.raises(FacesynthError, match="unknown classifier"):
+        EmotionDetector(DetectorSettings(classifier="forest"))
     (tmp_path / "bad.safetensors").write_bytes(b"nothing")
     with pytest.raises(FacesynthError, match="not an emotion detector"):
         EmotionDetector.load(tmp_path / "bad.safetensors")
@@ -146,12 +176,12 @@ def test_bad_input_is_one_clear_line(detector, clips, tmp_path):
 EMOTIONS = ("neutral", "calm", "happy", "sad", "angry", "fearful", "disgust", "surprised")
 
 
-def acted(folder, actors):
-    """RAVDESS speech of some actors; its file names say the emotion, the statement and the actor."""
+def acted(folder, actors, takes=("01", "02")):
+    """RAVDESS speech of some actors; its file names say the emotion, the statement, the repetition and the actor."""
     clips = []
     for file in sorted(folder.rglob("*.flac")):
         fields = file.stem.split("-")
-        if fields[6] in actors:
+        if fields[6] in actors and fields[5] in takes:
             audio, rate = soundfile.read(file, dtype="float32", always_2d=True)
             sound = resample(audio.mean(axis=1), rate, RATE)
             clips.append(Clip(sound, RATE, EMOTIONS[int(fields[2]) - 1], fields[6], fields[4]))
@@ -159,7 +189,7 @@ def acted(folder, actors):
 
 
 def test_an_unseen_speaker_of_real_speech(recordings):
-    clips = acted(recordings("ravdess_speech"), {"01", "02", "03"})
+    clips = acted(recordings("ravdess_speech"), {"01", "02", "03"}, takes={"01"})
     detector = EmotionDetector(DetectorSettings(normalise=True))
     x = detector.features_of(clips)
     speakers, emotions = (np.array([getattr(c, name) for c in clips]) for name in ("speaker", "emotion"))
@@ -167,13 +197,13 @@ def test_an_unseen_speaker_of_real_speech(recordings):
     detector.fit_features(x[train], [c for c, t in zip(clips, train, strict=True) if t])
     decided = detector.decide(by_speaker(x[~train], speakers[~train]))
     recall = np.mean([(decided == e)[emotions[~train] == e].mean() for e in np.unique(emotions)])
-    assert recall > 0.3
+    assert recall > 0.5
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("normalise", "floor"), [(False, 0.42), (True, 0.52)])
-def test_six_unseen_speakers_are_heard_better_than_by_plain_statistics(recordings, normalise, floor):
-    """Floors: statistics of 20 MFCC, deltas and pitch with a radial SVM, each speaker left out in turn."""
+@pytest.mark.parametrize(("normalise", "floor"), [(False, 0.58), (True, 0.70)])
+def test_six_unseen_speakers_are_heard_better_than_by_statistics_of_the_voice(recordings, normalise, floor):
+    """Statistics of the voice and a radial SVM reach 0.47 and 0.56; each speaker is left out in turn."""
     clips = acted(recordings("ravdess_speech"), {f"{n:02d}" for n in range(1, 7)})
     result = recognise(clips, DetectorSettings(normalise=normalise), "by speaker")
     assert result.unweighted_recall > floor

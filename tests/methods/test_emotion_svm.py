@@ -5,7 +5,7 @@ from sklearn.svm import SVC, NuSVC
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.probabilities import couple, fit_sigmoid, vote
-from facesynth.methods.emotion.svm import KERNELS, Svm, SvmSettings
+from facesynth.methods.emotion.svm import KERNELS, SvmSettings, fit_svm
 
 
 def blobs(classes, seed=0, each=25, features=6):
@@ -20,7 +20,7 @@ def blobs(classes, seed=0, each=25, features=6):
 @pytest.mark.parametrize("formulation", ["C", "nu"])
 def test_decides_as_scikit_learn_does(classes, kernel, formulation):
     x, y = blobs(classes)
-    machine = Svm.fit(x, y, SvmSettings(kernel, formulation, nu=0.3))
+    machine = fit_svm(x, y, SvmSettings(kernel, formulation, nu=0.3))
     shared = {"kernel": KERNELS[kernel], "gamma": "auto", "decision_function_shape": "ovo"}
     reference = (SVC(**shared) if formulation == "C" else NuSVC(nu=0.3, **shared)).fit(x, y)
     new = np.random.default_rng(9).normal(size=(300, x.shape[1])) * 1.5
@@ -92,7 +92,7 @@ def test_platt_minimises_its_loss_and_stays_finite_on_separable_margins():
 def test_probabilities_are_calibrated():
     x, y = blobs(3, each=400)
     train = np.arange(len(y)) % 2 == 0
-    p = Svm.fit(x[train], y[train], SvmSettings("radial"))(torch.from_numpy(x[~train])).numpy()
+    p = fit_svm(x[train], y[train], SvmSettings("radial"))(torch.from_numpy(x[~train])).numpy()
     np.testing.assert_allclose(p.sum(axis=1), 1)
     sure, right = p.max(axis=1), p.argmax(axis=1) == y[~train]
     for low, high in ((0.4, 0.6), (0.6, 0.8), (0.8, 1.0)):
@@ -108,6 +108,6 @@ def test_votes_tie_to_the_lowest_class():
 def test_one_class_and_unknown_kernels_are_refused():
     x, y = blobs(2)
     with pytest.raises(FacesynthError, match="two classes"):
-        Svm.fit(x, np.zeros_like(y), SvmSettings())
+        fit_svm(x, np.zeros_like(y), SvmSettings())
     with pytest.raises(FacesynthError, match="kernel"):
-        Svm.fit(x, y, SvmSettings("cubic"))
+        fit_svm(x, y, SvmSettings("cubic"))

@@ -17,13 +17,18 @@ from facesynth.inference.emotion_track import HOP_S, WINDOW_S, track_of
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.pitch import RATE
 from facesynth.inference.speech import EmotionTrack
+from facesynth.methods.emotion.discriminant import Shrinkage, fit_discriminant
+from facesynth.methods.emotion.pairwise import Kernel, PairwiseClassifier
 from facesynth.methods.emotion.probabilities import vote
-from facesynth.methods.emotion.svm import Kernel, Svm, SvmSettings
+from facesynth.methods.emotion.svm import SvmSettings, fit_svm
 from facesynth.methods.model_file import read_header, read_tensors, write_model
 from facesynth.methods.parts import part
 from facesynth.progress import track
 from facesynth.speech.cepstrum import RealCepstrum
 from facesynth.speech.mel_cepstra import MelCepstra
+from facesynth.speech.phone_network import phone_network
+
+CLASSIFIERS = ("discriminant", "svm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +48,17 @@ class Clip:
 class DetectorSettings:
     """What a detector is made of; the keys of configs/emotion.yaml.
 
-    `features` is `voice` (187 statistics of timbre, pitch, dynamics and rhythm) or `paper` (three moments and
-    `coefficients` of the cepstrum). `normalise`: every speaker's features are brought to that speaker's own mean and
-    spread, over all of the speaker's recordings; a new speaker then needs some too.
+    `features` is `voice` (187 statistics of timbre, pitch, dynamics and rhythm), `voice_and_phone_net` (the same and 864 of
+    the phone network's layers) or `paper` (three moments and `coefficients` of the cepstrum). `classifier`: `discriminant`
+    (linear, its covariance shrunken by `shrinkage`) or `svm` (`kernel` to `nu`, as in the paper). `normalise`: every speaker's
+    features are brought to that speaker's own mean and spread, over all of the speaker's recordings; a new speaker then needs
+    some too.
     """
 
-    features: Literal["voice", "paper"] = "voice"
+    features: Literal["voice_and_phone_net", "voice", "paper"] = "voice_and_phone_net"
     coefficients: int = 500
+    classifier: Literal["discriminant", "svm"] = "discriminant"
+    shrinkage: Shrinkage = "auto"
     kernel: Kernel = "radial"
     formulation: Literal["C", "nu"] = "C"
     cost: float = 3.0
@@ -67,7 +76,7 @@ class DetectorSettings:
 
 
 class EmotionDetector(nn.Module):
-    """Features, scaling and a support vector machine.
+    """Features, scaling and a classifier of pairs of emotions.
 
     No `Method`: it learns from labelled sounds and gives emotions, where methods learn from a corpus and give motion.
     """
@@ -85,8 +94,10 @@ class EmotionDetector(nn.Module):
         self.settings = settings or DetectorSettings()
         if self.settings.features not in FRONT_ENDS:
             raise unknown("feature set", self.settings.features, FRONT_ENDS)
-        voice = self.settings.features == "voice"
-        self.front = MelCepstra() if voice else RealCepstrum(self.settings.coefficients)
+        if self.settings.classifier not in CLASSIFIERS:
+            raise unknown("classifier", self.settings.classifier, CLASSIFIERS)
+        paper = self.settings.features == "paper"
+        self.front = RealCepstrum(self.settings.coefficients) if paper else MelCepstra()
         self.emotions: tuple[str, ...] = ()
         self.provenance: dict[str, Any] = {}
 
@@ -115,12 +126,16 @@ class EmotionDetector(nn.Module):
             x = by_speaker(x, speakers)
         y = np.array([emotions.index(clip.emotion) for clip in clips])
         groups = speakers if len(set(speakers.tolist())) > 1 else np.array([clip.sentence for clip in clips])
-        chosen = {f.name: getattr(self.settings, f.name) for f in fields(SvmSettings)}
         device = self._device
         self._fit_scaling(x)
-        self.machine = Svm.fit(self._scaled(torch.from_numpy(x)).numpy(), y, SvmSettings(**chosen), groups)
+        self.machine = self._fit_machine(self._scaled(torch.from_numpy(x)).numpy(), y, groups)
         self.emotions = tuple(emotions)
         return self.to(device).eval()
+
+    def _fit_machine(self, x: NDArray[np.float64], y: NDArray[np.int64], groups: NDArray[Any]) -> PairwiseClassifier:
+        if self.settings.classifier == "discriminant":
+            return fit_discriminant(x, y, self.settings.shrinkage, groups)
+        return fit_svm(x, y, SvmSettings(**{f.name: getattr(self.settings, f.name) for f in fields(SvmSettings)}), groups)
 
     def _fit_scaling(self, x: NDArray[np.float64]) -> None:
         """The paper's features to [-1, 1]; the voice's, of many shapes, to mean 0 and spread 1."""
@@ -175,7 +190,9 @@ class EmotionDetector(nn.Module):
 
     def _listening(self) -> EmotionReader:
         settings = ReaderSettings(self.settings.features, self.settings.normalise, RATE)
-        return EmotionReader(self.emotions, settings, part(self._front, self._device), part(self.judge, self._device))
+        front, machine = part(self._front, self._device), part(self.judge, self._device)
+        network = phone_network().part if settings.features == "voice_and_phone_net" else None
+        return EmotionReader(self.emotions, settings, front, machine, network=network)
 
     @property
     def _device(self) -> torch.device:
@@ -199,9 +216,11 @@ class EmotionDetector(nn.Module):
         header = read_header(path, what="an emotion detector")
         if header["method"] != cls.name:
             raise FacesynthError(f"{path} holds a model of method {header['method']!r}, not an emotion detector")
-        detector = cls(DetectorSettings.from_config(header["config"]))
+        # Files written before there was a choice hold support vectors.
+        detector = cls(DetectorSettings.from_config({"classifier": "svm", **header["config"]}))
         detector.emotions, detector.provenance = tuple(header["emotions"]), header["provenance"]
-        detector.machine = Svm(len(detector.emotions), detector.settings.kernel)
+        linear = detector.settings.classifier == "discriminant"
+        detector.machine = PairwiseClassifier(len(detector.emotions), "linear" if linear else detector.settings.kernel)
         read_tensors(path, detector, header)
         return detector.eval()
 

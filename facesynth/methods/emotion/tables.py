@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.emotion.detector import Clip, DetectorSettings, EmotionDetector, by_speaker
-from facesynth.methods.emotion.svm import Kernel
+from facesynth.methods.emotion.pairwise import Kernel
 from facesynth.progress import track
 
 Split = Literal["train = test", "random halves", "by sentence", "by speaker"]
@@ -63,7 +63,7 @@ def recognise(
 
 def table_one(clips: Sequence[Clip], splits: Sequence[Split] = SPLITS[:3]) -> list[Recognition]:
     """The paper's features with 50 to 1000 coefficients, linear and radial kernel, under each split."""
-    plain = DetectorSettings(features="paper", coefficients=max(COEFFICIENTS), cost=1.0)
+    plain = DetectorSettings(features="paper", coefficients=max(COEFFICIENTS), classifier="svm", cost=1.0)
     x = EmotionDetector(plain).features_of(clips)
     kernels: tuple[Kernel, ...] = ("linear", "radial")
     rows = [(split, count, kernel) for split in splits for kernel in kernels for count in COEFFICIENTS]
