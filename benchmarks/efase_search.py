@@ -27,9 +27,10 @@ from facesynth.inference.efase.bounds import step_bounds
 from facesynth.inference.efase.costs import Query, Weights, all_targets
 from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.search import SearchIndex
+from facesynth.inference.efase.soft import soft_search
 from facesynth.inference.efase.steps import path_cost
 from facesynth.methods.efase.penalty import median_transition
-from facesynth.methods.efase.torch_search import torch_engine
+from facesynth.methods.efase.torch_search import torch_engine, torch_mix
 
 SEED = 0
 SIZES = (1000, 2000, 4000, 8000, 16000)
@@ -116,13 +117,13 @@ def weights_for(nodes, penalty, found):
     return replace(unit, pnt=penalty * median_transition(nodes, unit))
 
 
-def timed(what, repeats=3):
-    """Least processor seconds, and the result."""
+def timed(what, repeats=3, clock=time.process_time):
+    """Least seconds, of the processor unless told, and the result."""
     times = []
     for _ in range(repeats):
-        start = time.process_time()
+        start = clock()
         result = what()
-        times.append(time.process_time() - start)
+        times.append(clock() - start)
     return min(times), result
 
 
@@ -154,6 +155,28 @@ def most_mb(prepare, nodes, weights, targets):
     return peak / 1e6
 
 
+def on_device(nodes, query, weights, device):
+    """Cheapest path and mean over paths, by numpy and by tensors on a device; seconds of the clock, best of three."""
+    targets = all_targets(nodes, query, weights)
+    temperature, limit = median_transition(nodes, replace(weights, pnt=1.0)), 150
+    print(f"N = {len(nodes)}, T = {len(query)}; seconds of the clock, prepared; soft over {limit} candidates")
+    hard = {"numpy": by_numpy(nodes, weights), str(device): torch_engine(nodes, weights, device)}
+    found = {}
+    for name, engine in hard.items():
+        engine(targets)
+        seconds, path = timed(lambda e=engine: e(targets), clock=time.perf_counter)
+        found[name] = path
+        print(f"  hard, {name}: {seconds:.4f} s, cost {path_cost(nodes, query, path, weights):.8g}", flush=True)
+    means = {}
+    for name, mix in {"numpy": None, str(device): torch_mix(nodes, weights, device)}.items():
+        asked = nodes, query, targets, weights, found["numpy"], temperature, limit
+        soft_search(*asked, mix=mix)
+        seconds, means[name] = timed(lambda m=mix, a=asked: soft_search(*a, mix=m), clock=time.perf_counter)
+        print(f"  soft, {name}: {seconds:.4f} s", flush=True)
+    apart = max(np.abs(a.shares - b.shares).max() for a, b in zip(*means.values(), strict=True))
+    print(f"  largest difference of a share: {apart:.1e}")
+
+
 def growth(nodes_of, query_of, penalty, found):
     """Of the numpy search, prepared."""
     sizes, seconds = [], []
@@ -180,6 +203,7 @@ def main():
     parser.add_argument("--nodes", type=int, default=5556, help="at most so many")
     parser.add_argument("--penalty", type=float, nargs="+", default=[10.0], help="PNT over the median rule-2 cost")
     parser.add_argument("--found", action="store_true", help="the default weights and PNT of Efase")
+    parser.add_argument("--device", help="where to search by tensors, beside numpy, in place of the rest")
     parser.add_argument("--growth", action="store_true", help="also how the time grows with N")
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -194,6 +218,9 @@ def main():
 
     for penalty in [Efase().config["penalty"]] if options.found else options.penalty:
         nodes = nodes_of(options.nodes)
+        if options.device:
+            on_device(nodes, query_of(nodes), weights_for(nodes, penalty, options.found), torch.device(options.device))
+            continue
         compared(nodes, query_of(nodes), weights_for(nodes, penalty, options.found))
         if options.growth:
             print(f"growth of the numpy search, PNT = {penalty} x median:")

@@ -1,5 +1,6 @@
 """A second recording of the same words and emotion: how near one performer comes to himself."""
 
+from collections.abc import Sequence
 from difflib import SequenceMatcher
 
 import numpy as np
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
+
+Span = tuple[str, float, float]
+"""Label, start and end (s)."""
 
 
 def second_take(corpus: Corpus, utterance_id: str) -> Utterance | None:
@@ -25,25 +29,31 @@ def retimed(take: Utterance, phones: PhoneTrack) -> Motion:
     """
     theirs = take.speech.phones
     times_s = np.arange(phones.frame_bounds(take.motion.fps)[-1]) / take.motion.fps
-    here, there = _anchors(phones, theirs)
+    here, there = matching_times(spans(phones), spans(theirs))
     at = np.interp(times_s, here, there) * take.motion.fps
-    head = None if take.motion.head is None else _sampled(take.motion.head, at)
-    return Motion(_sampled(take.motion.frames, at), take.motion.fps, take.motion.layout, head)
+    head = None if take.motion.head is None else sampled(take.motion.head, at)
+    return Motion(sampled(take.motion.frames, at), take.motion.fps, take.motion.layout, head)
 
 
-def _anchors(phones: PhoneTrack, theirs: PhoneTrack) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times (s) in both tracks at which a common phone starts or ends, with the start and the end of both."""
-    runs = SequenceMatcher(None, phones.labels, theirs.labels, autojunk=False).get_matching_blocks()
-    pairs = {(0.0, 0.0), (phones.duration_s, theirs.duration_s)}
+def spans(phones: PhoneTrack) -> list[Span]:
+    """Label, start and end (s) of each phone."""
+    return list(zip(phones.labels, phones.starts_s.tolist(), phones.ends_s.tolist(), strict=True))
+
+
+def matching_times(phones: Sequence[Span], theirs: Sequence[Span]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times (s) in both at which a common phone starts or ends, with the start and the end of both."""
+    labels = [[label for label, _, _ in some] for some in (phones, theirs)]
+    runs = SequenceMatcher(None, *labels, autojunk=False).get_matching_blocks()
+    pairs = {(phones[0][1], theirs[0][1]), (phones[-1][2], theirs[-1][2])}
     for run in runs:
         for i, j in zip(range(run.a, run.a + run.size), range(run.b, run.b + run.size), strict=True):
-            pairs |= {(float(phones.starts_s[i]), float(theirs.starts_s[j])), (float(phones.ends_s[i]), float(theirs.ends_s[j]))}
+            pairs |= {(phones[i][1], theirs[j][1]), (phones[i][2], theirs[j][2])}
     here, there = np.array(sorted(pairs)).T
-    kept = np.diff(here, prepend=-1.0) > 0
+    kept = np.diff(here, prepend=-np.inf) > 0
     return here[kept], there[kept]
 
 
-def _sampled(signal: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+def sampled(signal: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
     """[T', C] the channels of [T, C] at frame positions [T'], linearly, over missing samples too."""
     columns = []
     for column in signal.T:

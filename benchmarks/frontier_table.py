@@ -1,0 +1,122 @@
+"""What `frontier.py` measures of each row, clip by clip, and the tables that all folds together make."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from facesynth.corpus import Corpus, Utterance
+from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.geometry import lve
+from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
+from facesynth.evaluation.pair import UnavailableError
+from facesynth.evaluation.paired import holm
+from facesynth.evaluation.sync import SyncJudge
+from facesynth.evaluation.two_sample import two_sample
+from facesynth.inference.closures import close_at
+from facesynth.inference.lips import bilabial_spans
+from facesynth.inference.motion import Motion
+from facesynth.methods.learn.point_loss import lip_points
+
+Motions = dict[str, Motion]
+FIGURES = ("`lve`", "energy", "of the lips", "closure", "false", "closed: `lve`", "closure", "false", "in step", "told apart")
+BEST, AS_LIVELY = "eFASE soft, lips sharpened, residual", "network, sharpened"
+
+
+class Judge:
+    """Figures of rows on the tested clips, kept in a file."""
+
+    def __init__(self, learned: Corpus, tested: Corpus, nearest: float, path: Path) -> None:
+        """nearest: gap of the lips to which the same step closes them in all rows."""
+        self.tested, self.nearest, self.path = tested, nearest, path
+        self.threshold = closure_threshold((u.motion, u.speech.phones) for u in tested)
+        self.sync = SyncJudge.learn(learned)
+        self.recorded = {u.id: u.motion for u in tested}
+        self.rows: dict[str, np.ndarray] = dict(np.load(path)) if path.is_file() else {}
+
+    def add(self, row: str, motions: Motions) -> None:
+        """Measure a row and keep it."""
+        apart = told_apart(self.sync, motions, self.recorded)
+        lines = []
+        for u in self.tested:
+            own, shut = (figures(m, u, self.threshold) for m in (motions[u.id], closed(motions[u.id], u, self.nearest)))
+            lines.append([*own, shut[0], *shut[3:], in_step(self.sync, u, motions[u.id]), apart.get(u.id, np.nan)])
+        self.rows[row] = np.array(lines)
+        np.savez(self.path, **self.rows)
+
+    def line(self, row: str) -> str:
+        return cells(self.rows[row])
+
+
+def join(folder: Path) -> None:
+    """Tables over the folds that are there, one for each number of clips."""
+    by_count: dict[int, list[dict[str, np.ndarray]]] = {}
+    for path in sorted(folder.glob("figures_*_*.npz")):
+        by_count.setdefault(int(path.stem.split("_")[1]), []).append(dict(np.load(path)))
+    for count, folds in sorted(by_count.items()):
+        shared = [row for row in folds[0] if all(row in fold for fold in folds)]
+        rows = {row: np.concatenate([fold[row] for fold in folds]) for row in shared}
+        print(f"\n{count} clips to learn from, {len(folds)} folds, {len(rows[shared[0]])} clips tested\n")
+        print("| | " + " | ".join(FIGURES) + " |\n|---|" + "---:|" * len(FIGURES))
+        for row, lines in rows.items():
+            print(f"| {row} | {cells(lines)} |")
+        compared(rows)
+
+
+def compared(rows: dict[str, np.ndarray]) -> None:
+    """Which rows are farther off than the best search, clip by clip, Holm over all of them."""
+    others = [name for name in rows if name not in (BEST, "recorded")]
+    apart = {name: rows[name][:, 0] - rows[BEST][:, 0] for name in others}
+    chances = holm([float(wilcoxon(apart[name]).pvalue) for name in others])
+    print(f"\n{BEST} is nearer than")
+    for name, chance in zip(others, chances, strict=True):
+        print(f"- {name}: by {apart[name].mean():.3f} mm, in {(apart[name] > 0).sum()} clips, p = {chance:.2g}")
+
+
+def cells(lines: np.ndarray) -> str:
+    means = [np.nanmean(column) if np.isfinite(column).any() else np.nan for column in lines.T]
+    return " | ".join(f"{mean:.3f}" if k in (0, 5) else f"{mean:.2f}" for k, mean in enumerate(means))
+
+
+def told_apart(judge: SyncJudge, motions: Motions, recorded: Motions) -> dict[str, float]:
+    """By clip how well a classifier tells lips from recorded ones; empty where too few clips are tested."""
+    try:
+        return two_sample(judge.shapes, motions, recorded)
+    except UnavailableError:
+        return {}
+
+
+def figures(motion: Motion, utterance: Utterance, threshold: float) -> list[float]:
+    """Lip error, energy, energy of the lips, closures, false closures."""
+    phones, truth = utterance.speech.phones, utterance.motion
+    rates = []
+    for rate in (closure_rate, false_closure_rate):
+        try:
+            rates.append(rate(motion, phones, threshold))
+        except UnavailableError:
+            rates.append(np.nan)
+    return [lve(motion, truth), energy_ratio(motion, truth), lips_energy(motion, truth), *rates]
+
+
+def lips_energy(motion: Motion, truth: Motion) -> float:
+    """Energy ratio of the lip points alone."""
+    lips = lip_points(truth.layout)
+    count = min(len(motion), len(truth))
+    made, recorded = (np.linalg.norm(np.diff(m.points[:count, lips], axis=0), axis=2) for m in (motion, truth))
+    present = np.isfinite(recorded) & np.isfinite(made)
+    return float(made[present].sum() / recorded[present].sum())
+
+
+def closed(motion: Motion, utterance: Utterance, nearest: float) -> Motion:
+    """With lips as near at p, b and m as recorded lips mostly come."""
+    spans = bilabial_spans(utterance.speech.phones, motion.fps)
+    frames = close_at(motion.frames.astype(np.float64), motion.layout, spans, nearest, motion.fps)
+    return Motion(frames.astype(np.float32), motion.fps, motion.layout)
+
+
+def in_step(judge: SyncJudge, utterance: Utterance, motion: Motion) -> float:
+    """1 where lips fit the sound best without a shift, 0 elsewhere, NaN where that cannot be told."""
+    try:
+        return float(judge.shift_ms(utterance.speech, motion) == 0)
+    except UnavailableError:
+        return float("nan")

@@ -1,0 +1,204 @@
+"""What makes the network of poses better on clips that it never saw: one change at a time, and some together.
+
+python benchmarks/network_variants.py CORPUS -o FOLDER [--fold 1] [--device cuda] [--variants base largest …]
+
+Of the clips that a fold learns from a fifth is kept out; the rest is learned from, and the lip error of the clips kept out says
+which variant is best. The tested clips play no part. Each network stays in FOLDER, and is not learned again.
+"""
+
+import argparse
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from unittest.mock import patch
+
+import numpy as np
+import torch
+
+from facesynth.corpus import Corpus, Utterance
+from facesynth.evaluation.dynamics import energy_ratio
+from facesynth.evaluation.geometry import lve
+from facesynth.methods.learn import expectation, point_loss, windows
+from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.pose_network import PoseNetwork
+from facesynth.methods.network.method import Network
+from facesynth.methods.registry import load
+
+FOLDS, HELD_OUT = 5, 0.2
+ROOMS = {"point_loss": point_loss, "windows": windows, "expectation": expectation}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How a network is trained."""
+
+    settings: Mapping[str, object] = field(default_factory=dict)
+    """Of the method."""
+    constants: Mapping[str, float] = field(default_factory=dict)
+    """`room.NAME` of facesynth.methods.learn that are something else."""
+    shape: Mapping[str, float] = field(default_factory=dict)
+    """Of the network: width, dropout."""
+    unseen: float = 0.0
+    """Share of the pose to learn that is what networks say of it which learned from other clips."""
+
+    def __or__(self, other: "Variant") -> "Variant":
+        both = {name: {**getattr(self, name), **getattr(other, name)} for name in ("settings", "constants", "shape")}
+        return Variant(**both, unseen=max(self.unseen, other.unseen))
+
+
+BOTH, PHONE_NET = Variant({"features": "both"}), Variant({"features": "phone_net"})
+LARGEST = Variant(constants={"point_loss.LARGEST": 0.5})
+LARGER = Variant(constants={"point_loss.LARGEST": 1.5})
+LIPS = Variant(constants={"point_loss.LIPS": 12.0})
+SILENT = Variant(constants={"windows.SILENCE_SHARE": 0.7})
+SHIFTED = Variant(constants={"windows.SHIFT": 4.0})
+MIXED = Variant(constants={"windows.MIXED": 0.5})
+NOISY = Variant(constants={"windows.NOISE": 0.3, "windows.LOUDNESS": 0.3, "windows.MASK_SHARE": 0.9})
+TEMPO = Variant(constants={"windows.TEMPO": 0.25})
+DROPPED = Variant({"steps": 1000}, shape={"dropout": 0.35})
+LONGER = Variant({"steps": 1400})
+UNSEEN = Variant(unseen=0.5)
+SETTLED = Variant(constants={"expectation.AVERAGED": 0.995})
+VARIANTS = {
+    "base": Variant(),
+    "both": BOTH,
+    "phone_net": PHONE_NET,
+    "largest": LARGEST,
+    "larger": LARGER,
+    "lips": LIPS,
+    "silent": SILENT,
+    "shifted": SHIFTED,
+    "mixed": MIXED,
+    "noisy": NOISY,
+    "tempo": TEMPO,
+    "dropped": DROPPED,
+    "longer": LONGER,
+    "settled": SETTLED,
+    "unseen": UNSEEN,
+    "together": BOTH | LARGEST | SILENT | SETTLED,
+    "together dropped": BOTH | LARGEST | SILENT | SETTLED | DROPPED,
+    "together noisy": BOTH | LARGEST | SILENT | SETTLED | DROPPED | NOISY | MIXED,
+    "together unseen": BOTH | LARGEST | SILENT | SETTLED | UNSEEN,
+    "bands together": LARGEST | SILENT | SETTLED | DROPPED,
+    "bands together unseen": LARGEST | SILENT | SETTLED | DROPPED | UNSEEN,
+}
+VARIANTS |= {"sound": Variant({"phones": False})}
+VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in (0, 40, 80, 160, 320)}
+PARTS = 4
+"""Of the clips, for networks that did not learn from some of them."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("corpus", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--fold", type=int, default=1)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), metavar="NAME")
+    options = parser.parse_args()
+    rest, _ = parts(Corpus.open(options.corpus), options.fold)
+    learned, held_out = inner(rest, options.fold)
+    print(f"fold {options.fold}: {len(learned)} clips to learn from, {len(held_out)} to choose by", flush=True)
+    for name in options.variants:
+        began = perf_counter()
+        path = options.output / f"{options.fold}_{name.replace(' ', '_')}_{options.seed}.safetensors"
+        network = kept(path, learned, VARIANTS[name], options.seed, options.device)
+        lips, energy = judged(network, held_out)
+        (path.with_suffix(".json")).write_text(json.dumps({"fold": options.fold, "variant": name, "lve": lips, "energy": energy}))
+        print(f"| {options.fold} | {name} | {lips:.3f} | {energy:.2f} | {perf_counter() - began:.0f} s |", flush=True)
+
+
+def parts(corpus: Corpus, fold: int) -> tuple[Corpus, Corpus]:
+    """(to learn from, tested) of a fold, 1 to FOLDS."""
+    return list(corpus.folds(FOLDS, 0))[fold - 1]
+
+
+def inner(rest: Corpus, fold: int) -> tuple[Corpus, Corpus]:
+    """(to learn from, to choose by) of what a fold learns from."""
+    order = np.random.default_rng(4 + fold).permutation(len(rest.ids))
+    count = round(HELD_OUT * len(order))
+    return rest.subset([rest.ids[i] for i in order[count:]]), rest.subset([rest.ids[i] for i in order[:count]])
+
+
+def judged(network: Network, corpus: Corpus) -> tuple[float, float]:
+    """Mean lip error, mm, and energy."""
+    made = [(network.synthesize(u.speech), u.motion) for u in corpus]
+    return float(np.mean([lve(*pair) for pair in made])), float(np.mean([energy_ratio(*pair) for pair in made]))
+
+
+def kept(path: Path, corpus: Corpus, variant: Variant, seed: int, device: str) -> Network:
+    """The network of a file, or a new one that is written there."""
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trained(corpus, variant, seed, device).save(path)
+    found = load(path)
+    assert isinstance(found, Network)
+    return found
+
+
+def trained(corpus: Corpus, variant: Variant, seed: int, device: str) -> Network:
+    """A network on the processor that learned on a device."""
+    with changed(variant):
+        network = Network(**variant.settings).to(device)  # type: ignore[arg-type]
+        if variant.unseen:
+            recording, said = network.predictor.recording, said_unseen(corpus, variant, seed, device)
+            network.predictor.recording = lambda u, e: recording(mixed(u, said[u.id], variant.unseen), e)  # type: ignore
+        network.fit(corpus, seed=seed)
+        network.predictor.__dict__.pop("recording", None)
+        return network.to("cpu")
+
+
+OF_SOUND = Hearing.of_sound
+
+
+def of_sound(hearing: Hearing, audio: np.ndarray, heard: dict[object, np.ndarray] = {}) -> np.ndarray:  # noqa: B006
+    """What is heard of a sound, remembered."""
+    key = hearing.features, hearing.width, hashlib.sha256(audio.tobytes()).digest()
+    if key not in heard:
+        heard[key] = OF_SOUND(hearing, audio)
+    return heard[key]
+
+
+@contextmanager
+def changed(variant: Variant) -> Iterator[None]:
+    """The trainer with a variant's constants and shape."""
+    patches = [patch.object(ROOMS[name.split(".")[0]], name.split(".")[1], value) for name, value in variant.constants.items()]
+    patches.append(patch.object(expectation, "PoseNetwork", partial(PoseNetwork, **variant.shape)))
+    patches.append(patch.object(Hearing, "of_sound", of_sound))
+    for each in patches:
+        each.start()
+    try:
+        yield
+    finally:
+        for each in reversed(patches):
+            each.stop()
+
+
+def said_unseen(corpus: Corpus, variant: Variant, seed: int, device: str) -> dict[str, np.ndarray]:
+    """Frames of each clip as a network says them that did not learn from it."""
+    order, said = np.random.default_rng(seed).permutation(len(corpus.ids)), {}
+    for part in range(PARTS):
+        left = [corpus.ids[i] for i in order[part::PARTS]]
+        network = Network(**variant.settings).to(device)  # type: ignore[arg-type]
+        network.fit(corpus.subset([i for i in corpus.ids if i not in set(left)]), seed=seed + part)
+        said |= {i: network.synthesize(corpus[i].speech).frames for i in left}
+    return said
+
+
+def mixed(utterance: Utterance, said: np.ndarray, share: float) -> Utterance:
+    """An utterance whose motion is partly that of frames [T', C]."""
+    frames = utterance.motion.frames.copy()
+    count = min(len(said), len(frames))
+    frames[:count] += share * (said[:count] - frames[:count])
+    return replace(utterance, motion=replace(utterance.motion, frames=frames))
+
+
+if __name__ == "__main__":
+    torch.set_num_threads(2)
+    main()
