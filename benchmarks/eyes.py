@@ -31,6 +31,7 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.shift_patches import EITHER, LISTENING, SPEAKING
 from facesynth.inference.speech import PhoneTrack
+from facesynth.methods.baselines.random_eyes import random_eyes
 from facesynth.methods.eyes.method import Eyes
 from facesynth.methods.eyes.recordings import at_rate
 from facesynth.motion.lids import Lids
@@ -223,15 +224,6 @@ def draw(person: Motion, lids: list[Motion], packaged: Eyes, path: Path) -> None
     figure.savefig(path, dpi=90)
 
 
-def random_eyes(duration_s: float, fps: float, shifts_s: float, reach: np.ndarray, blinks: float, seed: int) -> np.ndarray:
-    """[T, 3]: places drawn evenly within reach (rad) at times of a Poisson process, as are blinks (a minute) of 0.2 s."""
-    rng, count = np.random.default_rng(seed), round(duration_s * fps)
-    changes = np.cumsum(rng.random(count) < 1 / (shifts_s * fps))
-    gaze = rng.uniform(-1, 1, (changes[-1] + 1, 2))[changes] * reach
-    shut = np.convolve(rng.random(count) < blinks / 60 / fps, np.ones(max(1, round(0.2 * fps))))[:count] > 0
-    return np.column_stack([1.0 - shut, gaze])
-
-
 def fitted_random(gaze: list[np.ndarray], fps: float) -> dict:
     """Rate and range of the recordings that are learned from."""
     kinds = pooled([fixation_statistics(one, fps) for one in gaze])
@@ -260,7 +252,7 @@ def fixation_rows(seen: People, role: str, others_people: list[Motion]) -> dict[
             "the package's model without the person": eyes_of(as_packaged(seen, others_people, left_out), still, left_out, role),
             "texture synthesis by two people of head_conversation": eyes_of(learnt(others_people), still, left_out),
             "constants": quiet_eyes(np.zeros((len(still), 6)), FIXATION_FPS, None, left_out),
-            "random gaze": random_eyes(still.duration_s, FIXATION_FPS, **chance, blinks=17, seed=left_out),
+            "random gaze": random_eyes(len(still), FIXATION_FPS, **chance, blinks=17, seed=left_out),
         }
         parts.append(
             {
@@ -309,10 +301,10 @@ def gaze_rows(people: list[Motion], seen: People) -> dict[str, dict[str, float]]
             "joined anywhere, as in the dissertation": eyes_of(learnt(others, joins="anywhere"), own, left_out),
             "texture synthesis that undoes 0.6": eyes_of(learnt(others, compensation=COMPENSATION), own, left_out),
             "constants": quiet_eyes(own.head, HEAD_FPS, None, left_out),
-            "random gaze": random_eyes(own.duration_s, HEAD_FPS, **chance, blinks=17, seed=left_out),
+            "random gaze": random_eyes(len(own), HEAD_FPS, **chance, blinks=17, seed=left_out),
             "the package's model without the person": eyes_of(as_packaged(seen, others), own, left_out),
             "the package's, as if the person spoke": eyes_of(as_packaged(seen, others), own, left_out, "speaking"),
-            "random gaze by gaze_conversation": random_eyes(own.duration_s, HEAD_FPS, **far_chance, blinks=17, seed=left_out),
+            "random gaze by gaze_conversation": random_eyes(len(own), HEAD_FPS, **far_chance, blinks=17, seed=left_out),
         }
         # what was not learned from averaged gaze is averaged as the recordings were
         learned = [row for row in made if "synthesis" in row or "anywhere" in row or row.endswith("without the person")]
@@ -333,9 +325,7 @@ def blink_rows(lids: list[Motion]) -> dict[str, dict[str, float]]:
         rows = {
             "texture synthesis": lambda motion, seed, model=model: model.look(motion, seed=seed).eyes,
             "constants": lambda motion, seed: quiet_eyes(np.zeros((len(motion), 6)), motion.fps, None, seed),
-            "Poisson blinks": lambda motion, seed, rate=rate: random_eyes(
-                motion.duration_s, motion.fps, 1.0, np.ones(2), rate, seed
-            ),
+            "Poisson blinks": lambda motion, seed, rate=rate: random_eyes(len(motion), motion.fps, 1.0, np.ones(2), rate, seed),
         }
         parts.append(
             {

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from head_sway import quiet_head
 from numpy.typing import NDArray
 
 from facesynth.config import load_config
@@ -109,7 +108,7 @@ def zoo(method: str, config: str = "", *, keyed: bool = False) -> Learner:
 
         def make(utterance: Utterance) -> NDArray:
             given = {"head_keys": ends_of(utterance)} if keyed else {}
-            return model.synthesize(utterance.speech, **given).head
+            return model.synthesize(utterance.speech, seed=seed_of(utterance), **given).head
 
         return make
 
@@ -137,24 +136,6 @@ def ends_of(utterance: Utterance) -> HeadKeys:
     return HeadKeys(np.array([0.0, (len(truth) - 1) / utterance.motion.fps]), truth[[0, -1]])
 
 
-def sway(_: Corpus, train: list[Utterance]) -> Maker:
-    rest = mean_head(train)
-
-    def make(u: Utterance) -> NDArray:
-        return rest + quiet_head(len(u.motion), u.motion.fps, loudness(u.speech, u.motion), seed_of(u))
-
-    return make
-
-
-def loudness(speech: Speech, motion: Motion) -> NDArray[np.float64]:
-    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
-    window = max(int(0.03 * speech.sample_rate), 1)
-    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
-    at = np.minimum((motion.times_s * speech.sample_rate).astype(np.int64), len(power) - 1)
-    level = np.sqrt(power[at])
-    return np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0)
-
-
 def still(_: Corpus, train: list[Utterance]) -> Maker:
     rest = mean_head(train)
     return lambda u: np.tile(rest, (len(u.motion), 1)) + 1e-9 * np.random.default_rng(0).standard_normal((len(u.motion), 6))
@@ -176,7 +157,7 @@ METHODS: dict[str, Learner] = {
     "recorded elsewhere": elsewhere,
     "still": still,
     "ridge from prosody": zoo("head_ridge"),
-    "sway": sway,
+    "sway": zoo("head_sway"),
     "knn": zoo("head_knn", "head_knn.yaml"),
     "knn, dissertation's weights": zoo("head_knn", "head_knn_paper.yaml"),
     "knn with key poses": zoo("head_knn", "head_knn.yaml", keyed=True),

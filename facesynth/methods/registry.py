@@ -33,6 +33,8 @@ BUILT_IN = {
         "ridge": "baselines.capabilities:RIDGE",
         "head_rest": "baselines.capabilities:HEAD_REST",
         "head_ridge": "baselines.capabilities:HEAD_RIDGE",
+        "head_sway": "baselines.capabilities:HEAD_SWAY",
+        "eyes_random": "baselines.capabilities:EYES_RANDOM",
         "coarticulation": "coarticulation.capabilities:CAPABILITIES",
         "eyes": "eyes.capabilities:CAPABILITIES",
         "expression": "expression.capabilities:CAPABILITIES",

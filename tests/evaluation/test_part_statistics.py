@@ -68,6 +68,8 @@ def test_their_page_is_written(compared):
 
 
 def test_reference_rows_are_those_of_the_parts_that_are_compared():
-    assert [one.method for one in references([contestant("head_hmm")])] == ["head_rest", "head_ridge"]
+    assert {one.method for one in references([contestant("head_hmm")])} == {"head_rest", "head_ridge", "head_sway"}
+    assert [one.method for one in references([contestant("eyes")])] == ["eyes_random"]
     assert "head_rest" not in [one.method for one in references([contestant("efase")])]
-    assert len(references()) == len(references([contestant("head_hmm"), contestant("efase")]))
+    every = [contestant(name) for name in ("head_hmm", "eyes", "efase")]
+    assert len(references()) == len(references(every))

@@ -19,3 +19,13 @@ HEAD_RIDGE = Capabilities(
     minutes=1.0,
     reference="head by ridge",
 )
+HEAD_SWAY = Capabilities(
+    "head_sway", "the head sways by constants", home=f"{HOME}.sway", part="head", reference="head that sways"
+)
+EYES_RANDOM = Capabilities(
+    "eyes_random",
+    "gaze and blinks at random times, as often as recorded",
+    home=f"{HOME}.random_eyes",
+    part="eyes",
+    reference="random eyes",
+)

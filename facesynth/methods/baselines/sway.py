@@ -1,0 +1,79 @@
+"""A head by constants: slow sway, and small nods where the voice is loud. Learned heads must be more like people than this."""
+
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from torch import Tensor
+
+from facesynth.corpus import Corpus
+from facesynth.inference.arrays import Floats
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import Speech
+from facesynth.methods.baselines.capabilities import HEAD_SWAY
+from facesynth.methods.learn.heads import mean_head, still_face, with_head
+from facesynth.methods.method import Method
+from facesynth.methods.registry import register
+
+SWAY_DEGREES = (0.9, 1.4, 0.8)
+"""Standard deviation of pitch, yaw and roll."""
+SWAY_S = 0.6
+"""Width of the smoothing that makes the sway slow."""
+NOD_DEGREES = 2.2
+"""How far the head goes down at full loudness."""
+LEVEL_S = 0.03
+"""Over how long the level of the sound is taken."""
+
+
+@register(HEAD_SWAY)
+class HeadSway(Method):
+    """The mean of all recorded poses, swaying by constants."""
+
+    frame: Tensor
+    """[C] the face at rest."""
+    pose: Tensor
+    """[6] rotation vector (rad) and translation (mm)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        for name in ("frame", "pose"):
+            self.register_buffer(name, torch.zeros(0))
+
+    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
+        """Take the mean pose; FacesynthError for fewer than two recordings with a head."""
+        self.learned_from(corpus)
+        device, recordings = self.device, with_head(corpus)
+        arrays = (still_face(corpus), mean_head(recordings))
+        self.frame, self.pose = (torch.from_numpy(np.ascontiguousarray(a, np.float32)).to(device) for a in arrays)
+        return self.eval()
+
+    def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
+        """A head that sways about the mean pose, for as long as the phones last."""
+        self.refuse(options)
+        layout = self.fitted_layout
+        count = int(speech.phones.frame_bounds(self.fps)[-1])
+        head = self.pose.cpu().numpy() + quiet_head(count, self.fps, loudness(speech, count, self.fps), seed)
+        return Motion(np.tile(self.frame.cpu().numpy(), (count, 1)), self.fps, layout, head.astype(np.float32))
+
+
+def quiet_head(count: int, fps: float, loudness: Floats, seed: int) -> NDArray[np.float32]:
+    """[T, 6] pose of a head that sways; loudness [T] in 0..1 makes the nods."""
+    rng = np.random.default_rng(seed)
+    margin = int(4 * SWAY_S * fps) + 1
+    noise = gaussian_filter1d(rng.normal(size=(count + 2 * margin, 3)), SWAY_S * fps, axis=0)
+    noise = noise[margin : margin + count] / max(noise.std(), 1e-9)
+    turn = np.radians(SWAY_DEGREES) * noise
+    nod = gaussian_filter1d(loudness - loudness.mean(), 0.09 * fps, mode="nearest") if count else loudness
+    turn[:, 0] += np.radians(NOD_DEGREES) * nod
+    return np.hstack([turn, np.zeros((count, 3))]).astype(np.float32)
+
+
+def loudness(speech: Speech, count: int, fps: float) -> Floats:
+    """[T] root mean square of the sound around each frame, over its loudest tenth, at most 1."""
+    window = max(int(LEVEL_S * speech.sample_rate), 1)
+    power = np.convolve(speech.audio.astype(np.float64) ** 2, np.ones(window) / window, mode="same")
+    at = np.minimum((np.arange(count) / fps * speech.sample_rate).astype(np.int64), len(power) - 1)
+    level = np.sqrt(power[at])
+    return np.asarray(np.minimum(level / max(float(np.percentile(level, 90)), 1e-9), 1.0) if count else level)
