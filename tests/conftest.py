@@ -17,12 +17,12 @@ RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Tests that share what was trained or built run in one process: those of a file, of `all_trained`, and all of tests/export.
+    """Tests that share what was trained or built run in one process: those of a file, of `all_trained`, all of tests/export and of tests/studio.
 
     With `--dist loadgroup`, as `make test` says; else each process would build the fixtures of nearly every file anew.
     """
     for item in items:
-        group = item.path.parent if item.path.parent.name == "export" else item.path
+        group = item.path.parent if item.path.parent.name in ("export", "studio") else item.path
         shared = "all_trained" if "trained" in item.fixturenames else str(group.relative_to(item.config.rootpath))
         item.add_marker(pytest.mark.xdist_group(shared))
 

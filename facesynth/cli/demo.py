@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from facesynth.face.rig.arkit_rig import Rig
     from facesynth.inference.speech import Speech
     from facesynth.methods.method import Method
+    from facesynth.speech.segments import Segment
     from facesynth.stage.performance import Performance
 
 
@@ -63,7 +64,7 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
     clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
     model, fresh = trained_model(corpus, seed)
     clock.step("train", f"{model.name}: {model.capabilities.summary}")
-    speech = demo_speech(seed)
+    speech, _ = demo_speech(seed)
     clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
     stage = HeadStage.of(request)
     performance = stage.perform(model.synthesize(speech, seed=seed), speech, Cast(model))
@@ -117,8 +118,8 @@ def trained_model(corpus: Corpus, seed: int) -> tuple[Method, bool]:
     return model, True
 
 
-def demo_speech(seed: int) -> Speech:
-    """What the demo says, from the cache or said now; what is read back is what was written, in both cases."""
+def demo_speech(seed: int) -> tuple[Speech, tuple[Segment, ...]]:
+    """What the demo says, and its words, from the cache or said now; what is read back is what was written, in both cases."""
     import numpy as np
 
     from facesynth import __version__
@@ -127,14 +128,17 @@ def demo_speech(seed: int) -> Speech:
     from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
     from facesynth.performer.lines import DEMO_LINES
 
-    made_of = json.dumps([__version__, DEMO_LINES, seed])
+    made_of = json.dumps([__version__, DEMO_LINES, seed, "with words"])
     path = cache_dir("models") / f"demo-speech-{sha256(made_of.encode()).hexdigest()[:16]}.npz"
     if not path.exists():
         _keep_speech(path, seed)
-    kept = read_arrays(path, "the demo's speech", ("audio", "rate", "phones", "phone_ends_s", "emotions", "emotion_ends_s"))
+    names = ("audio", "rate", "phones", "phone_ends_s", "emotions", "emotion_ends_s", "words", "word_times_s")
+    kept = read_arrays(path, "the demo's speech", names)
     phones = PhoneTrack(tuple(kept["phones"].tolist()), kept["phone_ends_s"])
     emotions = EmotionTrack(tuple(kept["emotions"].tolist()), kept["emotion_ends_s"], np.ones(len(kept["emotions"])))
-    return Speech(kept["audio"], int(kept["rate"]), phones, emotions, " ".join(text for text, _ in DEMO_LINES))
+    timed = zip(kept["words"].tolist(), kept["word_times_s"].tolist(), strict=True)
+    words = tuple((word, start_s, end_s) for word, (start_s, end_s) in timed)
+    return Speech(kept["audio"], int(kept["rate"]), phones, emotions, " ".join(text for text, _ in DEMO_LINES)), words
 
 
 def _keep_speech(path: Path, seed: int) -> None:
@@ -145,7 +149,8 @@ def _keep_speech(path: Path, seed: int) -> None:
     from facesynth.speech.alignment import align
 
     lines = speak_lines(DEMO_LINES, seed=seed)
-    phones = align(lines.audio, lines.rate, lines.text).phones
+    found = align(lines.audio, lines.rate, lines.text)
+    phones = found.phones
     ends_s = [*lines.emotions.ends_s[:-1], phones.duration_s]
     arrays = {
         "audio": lines.audio,
@@ -154,6 +159,8 @@ def _keep_speech(path: Path, seed: int) -> None:
         "phone_ends_s": phones.ends_s,
         "emotions": np.array(lines.emotions.labels),
         "emotion_ends_s": np.array(ends_s),
+        "words": np.array([word for word, _, _ in found.words]),
+        "word_times_s": np.array([times_s for _, *times_s in found.words]),
     }
     with atomic_path(path) as part:
         np.savez(part, allow_pickle=False, **arrays)

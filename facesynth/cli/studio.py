@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from facesynth.inference.speech import Speech
+    from facesynth.speech.segments import Segment
 
 FILE = click.Path(path_type=Path)
 
@@ -42,7 +45,7 @@ def studio(
     from facesynth.inference.errors import FacesynthError
     from facesynth.studio.serve import serve
 
-    lines: dict[str, Speech] = {}
+    lines: dict[str, tuple[Speech, Sequence[Segment]]] = {}
     if demo:
         if corpus or model:
             raise FacesynthError("--demo brings a corpus and a model; leave yours out")
@@ -59,7 +62,7 @@ def studio(
     serve(folder, corpus, model, port=port, rig=rig, mapping=mapping, lines=lines, opened=opened)
 
 
-def _built_in() -> tuple[Path, Path, dict[str, Speech]]:
+def _built_in() -> tuple[Path, Path, dict[str, tuple[Speech, Sequence[Segment]]]]:
     """The built-in performer's corpus, a model of it, and a line that neither has heard."""
     from facesynth.cli.demo import demo_speech, trained_model
     from facesynth.performer.build import build_performer

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import still_eyes
+from facesynth.face.rig.markers import marker_layout
 from facesynth.face.solve.animate import animate
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
@@ -67,6 +68,13 @@ class Performing:
     def head(self) -> Any:
         """What is shown: the built-in head, or one's own."""
         return self._preview.stage.own or self._preview.stage.rig
+
+    def markers(self) -> list[tuple[str, float, float, float]]:
+        """Name and place (mm) of the markers on the built-in head at rest; one's own head has none."""
+        if self._preview.stage.own is not None:
+            return []
+        layout = marker_layout(self._preview.stage.rig)
+        return [(name, *map(float, place)) for name, place in zip(layout.names, np.reshape(layout.neutral, (-1, 3)), strict=True)]
 
     def speech(self, sound: Path, line: Line, take: Take) -> Speech:
         """What a take says."""

@@ -5,11 +5,12 @@
 - `lines/NAME/NAME.wav`: the sound of a line
 - `lines/NAME/TAKE/`: `phones.TextGrid`, `emotions.csv`, `constraints.csv`, which `speak` takes; written after each change
 - `edits.jsonl`: nodes that were removed and drawn, after those edits that the corpus had (`corpus-edits.jsonl`)
+- `kept-edits.jsonl`: those of them that the corpus has taken over
 - `exports/`: what was exported
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -25,10 +26,10 @@ from facesynth.speech.audio import as_saved, save_wav
 from facesynth.studio.commands import CHANGES, changed
 from facesynth.studio.document import Document, Drawn, Line
 from facesynth.studio.kept_changes import REDO, UNDO, Change, KeptChanges
-from facesynth.studio.speak_files import drawn_names, write_edits, write_take
+from facesynth.studio.speak_files import EditLines, edit_lines, write_take
 
 FORMAT = 1
-EDITS, BEFORE = "edits.jsonl", "corpus-edits.jsonl"
+EDITS, BEFORE, TAKEN = "edits.jsonl", "corpus-edits.jsonl", "kept-edits.jsonl"
 NODES = "nodes"
 """In place of a line's name: the nodes that may be used."""
 
@@ -54,7 +55,7 @@ class Project:
         self.changed_at: dict[str, int] = {}
         """Revision at which each line, and NODES, changed last."""
         self._lock, self._journal = lock, journal
-        self._before = _lines(folder / BEFORE)
+        self._before, self._taken = _lines(folder / BEFORE), _lines(folder / TAKEN)
         self._past: list[Document] = []
         self._future: list[Document] = []
         for number, change in enumerate(changes, start=1):
@@ -124,12 +125,31 @@ class Project:
     @property
     def edits(self) -> Path | None:
         """The file of removed and drawn nodes; None where there are none."""
-        return self.folder / EDITS if self.document.removed or self.document.drawn else None
+        return self.folder / EDITS if self.document.removed or self.document.drawn or self._taken else None
 
     @property
     def drawn(self) -> list[tuple[str, Drawn]]:
         """The drawn nodes under the names by which they are constrained and removed."""
-        return list(zip(drawn_names(self.document, self._before), self.document.drawn, strict=True))
+        return list(zip(self._edit_lines().drawn, self.document.drawn, strict=True))
+
+    def keep_edits(self, corpus: Path) -> int:
+        """Let the corpus take over which nodes were removed and drawn, for whatever learns from it; gives how many lines are new.
+
+        FacesynthError where the corpus's edits are not those that the project goes on from, and where nothing is new.
+        """
+        there, wanted = _lines(corpus / EDITS), self._edit_lines().lines
+        known = (*self._before, *self._taken)
+        if there not in (known, wanted):
+            raise FacesynthError(
+                f"{corpus / EDITS} was changed elsewhere since this project began; see them by `facesynth corpus edit list`,"
+                " and begin a new project that goes on from them"
+            )
+        if wanted == known:
+            raise FacesynthError("the corpus has all of these edits already")
+        write_text(corpus / EDITS, _text(wanted))
+        write_text(self.folder / TAKEN, _text(wanted[len(self._before) :]))
+        self._taken = wanted[len(self._before) :]
+        return len(wanted) - len(known)
 
     def keep_sound(self, line: str, audio: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
         """Write a line's sound before the line is added; gives what will be read back. Another line's is refused."""
@@ -189,7 +209,7 @@ class Project:
             if line.name in kept.lines:
                 self._write_line(line)
         if kept.nodes:
-            write_edits(self.folder / EDITS, self.document, self._before)
+            self._write_edits()
 
     def _write_line(self, line: Line) -> None:
         for take in line.takes:
@@ -200,7 +220,13 @@ class Project:
             if not self.sound(line.name).is_file():
                 raise FacesynthError(f"{self.sound(line.name)} is missing; restore it from a copy")
             self._write_line(line)
-        write_edits(self.folder / EDITS, self.document, self._before)
+        self._write_edits()
+
+    def _write_edits(self) -> None:
+        write_text(self.folder / EDITS, _text(self._edit_lines().lines))
+
+    def _edit_lines(self) -> EditLines:
+        return edit_lines(self.document, self._before, self._taken)
 
 
 def read_facts(folder: Path) -> dict[str, str]:
@@ -230,11 +256,15 @@ def _keep_edits(folder: Path, corpus: Path | None) -> None:
     """Keep the edits that the corpus has when a project begins: drawn nodes are called by the line that adds them."""
     there = corpus / EDITS if corpus else None
     if not (folder / "journal.jsonl").exists() and there is not None and there.is_file():
-        write_text(folder / BEFORE, "".join(line + "\n" for line in _lines(there)))
+        write_text(folder / BEFORE, _text(_lines(there)))
 
 
 def _lines(path: Path) -> tuple[str, ...]:
     return tuple(path.read_text(encoding="utf-8").splitlines()) if path.is_file() else ()
+
+
+def _text(lines: Sequence[str]) -> str:
+    return "".join(line + "\n" for line in lines)
 
 
 def _differing(before: Document, after: Document) -> tuple[str, ...]:

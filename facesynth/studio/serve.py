@@ -3,7 +3,7 @@
 import secrets
 import socket
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,6 +15,7 @@ from facesynth.face.files.gltf.write import write_glb
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import Speech
 from facesynth.methods.registry import load
+from facesynth.speech.segments import Segment
 from facesynth.studio.document import first_take, take_facts
 from facesynth.studio.guard import LARGEST_MESSAGE_BYTES
 from facesynth.studio.performing import Performing
@@ -32,12 +33,12 @@ def serve(
     port: int = 0,
     rig: Path | None = None,
     mapping: Path | None = None,
-    lines: Mapping[str, Speech] = MappingProxyType({}),
+    lines: Mapping[str, tuple[Speech, Sequence[Segment]]] = MappingProxyType({}),
     opened: Callable[[str], None],
 ) -> None:
     """Serve a project until somebody ends it. opened: is given the address, with the token, when the studio answers.
 
-    lines: what a project begins with that has none, by name.
+    lines: what a project begins with that has none, by name: speech and its words.
 
     FacesynthError, before anything is served, for what cannot be opened.
     """
@@ -51,9 +52,9 @@ def serve(
         raise FacesynthError(f"{folder} is no project yet; give the corpus that it is about")
     performing = Performing.of(load(model), rig, mapping) if model else None
     project = Project.open(folder, corpus.resolve(), model.resolve() if model else None)
-    for name, speech in lines.items() if not project.revision else ():
+    for name, (speech, words) in lines.items() if not project.revision else ():
         project.keep_sound(name, speech.audio, speech.sample_rate)
-        take = take_facts(first_take(speech.phones, (), speech.emotions))
+        take = take_facts(first_take(speech.phones, words, speech.emotions))
         project.change("add_line", {"name": name, "text": speech.text, "take": take, "utterance": ""})
     token = secrets.token_urlsafe(24)
     with tempfile.TemporaryDirectory(prefix="facesynth-studio-") as shown, _listening(port) as listening:

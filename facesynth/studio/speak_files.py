@@ -4,7 +4,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,20 +31,55 @@ def write_take(folder: Path, take: Take) -> None:
     write_text(folder / CONSTRAINTS, _constraints(take))
 
 
-def write_edits(path: Path, document: Document, before: Sequence[str]) -> None:
-    """Write which nodes were drawn and removed as a corpus keeps its edits, after those that the corpus had (`before`)."""
-    drawn = [
-        {"op": "add", "phone": node.phone, "emotion": node.emotion, "title": node.title, "frames": node.frames}
-        for node in document.drawn
-    ]
-    removed = [{"op": "remove", "node": node} for node in document.removed]
-    lines = [*before, *(json.dumps(edit, ensure_ascii=False) for edit in [*drawn, *removed])]
-    write_text(path, "".join(line + "\n" for line in lines))
+@dataclass(frozen=True)
+class EditLines:
+    """The edits of a project as a corpus keeps them."""
+
+    lines: tuple[str, ...]
+    drawn: tuple[str, ...]
+    """Names of the drawn nodes: the numbers of the lines that add them."""
 
 
-def drawn_names(document: Document, before: Sequence[str]) -> list[str]:
-    """What a journal of edits calls the drawn nodes: by the lines that add them."""
-    return [node_name(ADDED, len(before) + number) for number in range(1, len(document.drawn) + 1)]
+def edit_lines(document: Document, before: Sequence[str], kept: Sequence[str] = ()) -> EditLines:
+    """Which nodes were drawn and removed, after the edits that the corpus had (`before`).
+
+    kept: lines of this project that the corpus has taken over since. They stay as they are, for a journal only grows; what
+    they say and the project does not say any more is taken back by further lines.
+    """
+    lines, names = [*before, *kept], list[str]()
+    unmatched = [number for number in range(len(before) + 1, len(lines) + 1) if _edit(lines[number - 1])["op"] == "add"]
+    for node in document.drawn:
+        line = _line(op="add", phone=node.phone, emotion=node.emotion, title=node.title, frames=node.frames)
+        number = next((number for number in unmatched if lines[number - 1] == line), None)
+        if number is None:
+            lines.append(line)
+            names.append(node_name(ADDED, len(lines)))
+        else:
+            unmatched.remove(number)
+            names.append(node_name(ADDED, number))
+    gone, kept_gone = [*document.removed, *(node_name(ADDED, number) for number in unmatched)], _gone_by(kept)
+    lines += [_line(op="remove", node=node) for node in gone if node not in kept_gone]
+    lines += [_line(op="restore", node=node) for node in kept_gone if node not in gone]
+    return EditLines(tuple(lines), tuple(names))
+
+
+def _gone_by(lines: Sequence[str]) -> list[str]:
+    """Nodes that these lines remove and do not restore."""
+    gone: dict[str, None] = {}
+    for edit in map(_edit, lines):
+        if edit["op"] == "remove":
+            gone[edit["node"]] = None
+        elif edit["op"] == "restore":
+            gone.pop(edit["node"], None)
+    return list(gone)
+
+
+def _line(**edit: Any) -> str:
+    return json.dumps(edit, ensure_ascii=False)
+
+
+def _edit(line: str) -> dict[str, Any]:
+    return dict(json.loads(line))
 
 
 def own_options(take: Take, model: Capabilities) -> dict[str, Any]:

@@ -80,6 +80,7 @@ class Studio:
             "corpus": corpus_facts(self.corpus),
             "outputs": OUTPUTS,
             "methods": mouths(),
+            "markers": self.performing.markers() if self.performing else [],
             "jobs": [job.facts() for job in self.jobs.known],
         }
         return {**facts, "folder": str(self.project.folder), "reports": self.reports()}
@@ -152,6 +153,12 @@ class Studio:
         outputs = [folder / "exports" / f"{line}-{take}{suffix}" for suffix in suffixes]
         words = arguments(self._model_path(), self.project.sound(line), request, said, outputs)
         return self.jobs.start(f"export {line}, take {take}", words)
+
+    async def keep_edits(self) -> int:
+        """Let the corpus take over removed and drawn nodes; gives how many edits are new there."""
+        count = self.project.keep_edits(self.corpus.path)
+        self._seen = signature(self.corpus.path, self.model)
+        return count
 
     def train(self, method: str) -> Job:
         """Let the command line learn a model of the corpus, and use it when it is there."""

@@ -189,6 +189,9 @@ class SocketWindow:
         job = self._studio.export(str(message["line"]), str(message["take"]), [str(s) for s in message["suffixes"]])
         return {"job": job.facts()}
 
+    async def _op_keep_edits(self, _message: dict[str, Any]) -> dict[str, Any]:
+        return {"count": await self._studio.keep_edits()}
+
     async def _op_cancel(self, message: dict[str, Any]) -> None:
         self._studio.jobs.cancel(int(message["number"]))
 

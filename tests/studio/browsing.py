@@ -98,6 +98,14 @@ class Page:
             " && s.shownRevision === s.project.revision && s.choicesRevision === s.project.revision; })()"
         )
 
+    def load_a_line(self, utterance):
+        """Of the corpus, by mouse."""
+        self.page.click("#new-line")
+        self.page.select_option("#new-line-utterance", utterance)
+        self.after(lambda: self.page.click("#new-line-add"))
+        self.until(f"facesynth.store.line === '{utterance}'")
+        self.until_settled()
+
     def revision(self):
         return self.see("facesynth.store.project.revision")
 

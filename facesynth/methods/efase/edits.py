@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from facesynth.corpus.journal import AddedNode, Edits, Journal
+from facesynth.corpus.journal import ADDED, AddedNode, Edits, Journal, parse_node
 from facesynth.inference.arrays import Ints
 from facesynth.inference.efase.editing import EfaseDraft, EfaseEditor
 from facesynth.inference.efase.kept import Memory
@@ -59,7 +59,8 @@ def changed_nodes(model: "Efase", edits: Edits) -> Changed:
     """Nodes of a model after edits; what the model was trained without, or with, stays so."""
     names: list[str] = model.facts["names"]
     known, gone_before = set(names), set(model.facts.get("removed", ()))
-    for name in sorted(edits.removed - known - gone_before - {one.name for one in edits.added}):
+    strange = sorted(edits.removed - known - gone_before)
+    for name in (one for one in strange if parse_node(one)[0] != ADDED):  # a drawn node may go before any model had it
         raise unknown("node to remove", name, names)
     old, new = model.nodes(), [one for one in edits.added if one.name not in known]
     for one in edits.added:

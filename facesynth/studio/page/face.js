@@ -2,14 +2,15 @@
 // card 52 of them for every vertex, and does not depend on what that card is.
 
 import { THREE, OrbitControls, GLTFLoader } from "/three.js";
+import { Markers } from "/page/markers.js";
 
 /** Without a graphics card every pixel costs: fewer are drawn, with simpler light. */
-const DRAWN_BY_PROCESSOR = (() => {
+const [CAN_DRAW, DRAWN_BY_PROCESSOR] = (() => {
   const context = document.createElement("canvas").getContext("webgl2");
   const facts = context?.getExtension("WEBGL_debug_renderer_info");
   const name = facts ? context.getParameter(facts.UNMASKED_RENDERER_WEBGL) : "";
   context?.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+  return [Boolean(context), /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name)];
 })();
 
 /** Pixels drawn for each of the page's, across: while the face moves, and when it has been still for MOVES_MS. */
@@ -18,8 +19,15 @@ const MOVES_MS = 250;
 
 let file = null; // the head is fetched once and read once for each window
 
+/** A loaded head on a canvas; null, and why in `note`, where this browser cannot draw it. */
+export async function openFace(canvas, note) {
+  if (CAN_DRAW) return new Face(canvas).load();
+  note.textContent = "This browser cannot draw the face: it has no WebGL 2. Without a graphics card, start Chromium or Chrome with --enable-unsafe-swiftshader, or take Firefox. All else works.";
+  return null;
+}
+
 /** A head on a canvas; `pose(row, names)` moves it, `ghost(row)` a pale one over it. */
-export class Face {
+class Face {
   constructor(canvas) {
     this.canvas = canvas;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !DRAWN_BY_PROCESSOR });
@@ -47,6 +55,13 @@ export class Face {
     this.scene.add(this.body.root);
     this.reset();
     return this;
+  }
+
+  /** Markers at places [[name, x, y, z], …] of the head at rest, mm; gives them, or null where there are none. */
+  mark(places) {
+    const [first] = this.body.meshes;
+    this.body.markers = first && places.length ? new Markers(first.surface, first.node, places) : null;
+    return this.body.markers;
   }
 
   reset() {
@@ -166,6 +181,7 @@ class Body {
   /** Row: weights in the order of `names`, head (3 rad, 3 mm), gaze (2 rad), lift of the tongue. */
   pose(row, names) {
     for (const surface of this.surfaces) surface.move(row, names);
+    this.markers?.follow();
     const at = names.length;
     const angle = Math.hypot(row[at], row[at + 1], row[at + 2]);
     const axis = new THREE.Vector3(row[at], row[at + 1], row[at + 2]).divideScalar(angle || 1);
@@ -221,6 +237,14 @@ class Surface {
       this.places = names.map((name) => this.index.get(name) ?? -1);
     }
     return this.places;
+  }
+
+  /** [names] how far one number of `position` moves for a weight of 1 of each shape. */
+  slopes(number, names) {
+    return this.order(names).map((place) => {
+      const found = place < 0 ? -1 : this.shapes[place].which.indexOf(number);
+      return found < 0 ? 0 : this.shapes[place].values[found];
+    });
   }
 
   move(row, names) {

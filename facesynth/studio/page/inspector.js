@@ -201,11 +201,16 @@ function showNodes() {
     make("button", { textContent: "Restore", "aria-label": `Restore ${node}`, onclick: () => change("restore_node", { node }, `${node} may be used again`) })));
   const made = drawn.map(({ title, phone, emotion, frames, node }) => make("div", { className: "row" }, make("strong", { textContent: title || "untitled" }),
     make("code", { textContent: node }), make("span", { textContent: `${phone}, ${emotion}, ${frames} frames` }),
-    removed.includes(node) ? null : make("button", { textContent: `Use at phone ${store.phone}`, "aria-label": `Use ${node} at phone ${store.phone}`, onclick: () => changeTake("pin", { phone: store.phone, node }, `${node} is used`) }),
+    removed.includes(node) ? null : make("button", { textContent: `Use at phone ${store.phone}`, "aria-label": `Use at phone ${store.phone}: ${node}`, onclick: () => changeTake("pin", { phone: store.phone, node }, `${node} is used`) }),
     removed.includes(node) ? null : make("button", { textContent: "Remove", "aria-label": `Remove ${node}`, onclick: () => change("remove_node", { node }) })));
   const none = make("p", { className: "note", textContent: store.model?.edits ? "none" : "This model takes no edits of its nodes." });
-  return [...suspects(removed), make("h3", { textContent: "Removed nodes" }), ...(gone.length ? gone : [none]), make("h3", { textContent: "Drawn nodes" }), ...(made.length ? made : [none.cloneNode(true)])];
+  const keeping = store.model?.edits ? [make("div", { className: "row" },
+    make("button", { id: "keep-edits", textContent: "Keep in the corpus", onclick: keepEdits }),
+    make("span", { className: "note", textContent: "Whatever is trained on the corpus from then on goes by what is removed and drawn here." }))] : [];
+  return [...suspects(removed), ...keeping, make("h3", { textContent: "Removed nodes" }), ...(gone.length ? gone : [none]), make("h3", { textContent: "Drawn nodes" }), ...(made.length ? made : [none.cloneNode(true)])];
 }
+
+const keepEdits = () => ask("keep_edits").then(({ count }) => say(`${count} edits are in the corpus now`)).catch((error) => say(error.message, true));
 
 /** Nodes that had better be looked at, the worst first, as the newest search for them found. */
 function suspects(removed) {

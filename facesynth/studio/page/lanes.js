@@ -157,17 +157,23 @@ export function drawEmotions(c, lane, take) {
   c.stroke();
 }
 
+/** How the share of a lane's height is read from a row: of a weight, or of a marker's place. */
+function readerOf(name, names) {
+  const column = names.indexOf(name);
+  return column < 0 ? (store.markers?.curve(name, names) ?? null) : (rows, start) => rows[start + column];
+}
+
 export function drawCurve(c, lane, name) {
   const drawn = [[store.recording?.utterance && store.recording.own ? store.recording : null, COLOURS.good], [store.before, COLOURS.ghost], [store.motion, COLOURS.text]];
   c.strokeStyle = COLOURS.edge;
   line(c, 0, lane.top, view.width, lane.top);
   for (const [motion, colour] of drawn) {
-    const column = motion?.names.indexOf(name) ?? -1;
-    if (column < 0) continue;
+    const read = motion && readerOf(name, motion.names);
+    if (!read) continue;
     c.strokeStyle = colour;
     c.beginPath();
     for (let pixel = 0; pixel <= view.width; pixel += 2) {
-      const value = valueAt(motion, at(pixel), column);
+      const value = Math.min(Math.max(valueAt(motion, at(pixel), read), 0), 1);
       c.lineTo(pixel, lane.top + lane.height - 3 - (lane.height - 8) * value);
     }
     c.stroke();

@@ -3,7 +3,7 @@
 import { connect, on, ask } from "/page/link.js";
 import { store, watch, changed, takeIn, choose, show, currentLine, currentTake, change, motionOf, rowAt, reportTo, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
-import { Face } from "/page/face.js";
+import { openFace } from "/page/face.js";
 import * as timeline from "/page/timeline.js";
 import * as inspector from "/page/inspector.js";
 import * as map from "/page/map.js";
@@ -25,7 +25,7 @@ async function begin() {
   buttons();
   keys();
   for (const part of [timeline, inspector, exporting, corpus]) part.begin();
-  face = await new Face(byId("face-canvas")).load();
+  face = await openFace(byId("face-canvas"), byId("face-note"));
   await Promise.all([recording.begin(), map.begin()]);
   watch("motion time recording", pose);
   watch("time", () => (byId("clock").textContent = `${sound.time().toFixed(3)} s`));
@@ -40,9 +40,11 @@ function listen() {
     Object.assign(store, { corpus: message.corpus, model: message.model, outputs: message.outputs, reports: message.reports });
     for (const job of message.jobs) store.jobs.set(job.number, job);
     corpus.setMethods(message.methods);
-    byId("face-note").textContent = message.model ? "" : "There is no model yet: train one on the page of the corpus.";
+    if (face) byId("face-note").textContent = message.model ? "" : "There is no model yet: train one on the page of the corpus.";
     document.title = `${message.folder.split("/").at(-1)} – facesynth studio`;
     changed("corpus");
+    store.places = message.markers;
+    if (face) markers();
     takeIn(message.project);
     show();
     measured.ready = true;
@@ -62,6 +64,11 @@ function listen() {
   });
   on("note", ({ lines }) => lines.length && say(lines.join("; "), true));
   on("closed", ({ reason }) => say(reason || "the studio was closed; what was done is kept", true));
+}
+
+function markers() {
+  store.markers ??= face.mark(store.places);
+  byId("markers").disabled = !store.markers;
 }
 
 function heardFace(message) {
@@ -141,7 +148,7 @@ function buttons() {
     if (await change("add_take", { line: store.line, take: store.take }, "a new take")) choose(store.line, currentLine().takes.at(-1).name);
   });
   press("remove-take", () => change("remove_take", { line: store.line, take: store.take }, "the take is removed; undo brings it back"));
-  press("face-reset", () => face.reset());
+  press("face-reset", () => face?.reset());
   press("tab-perform", () => turnTo("perform"));
   press("tab-corpus", () => turnTo("corpus"));
   press("new-line", openNewLine);
@@ -150,6 +157,10 @@ function buttons() {
   byId("line").addEventListener("change", (event) => choose(event.target.value, null));
   byId("take").addEventListener("change", (event) => choose(store.line, event.target.value));
   byId("ghost").addEventListener("change", ghostChosen);
+  byId("markers").addEventListener("change", () => {
+    store.markers.show(byId("markers").checked);
+    face.ask();
+  });
   byId("heat").addEventListener("change", () => {
     if (byId("heat").checked && !store.recording?.own) say("there is no recording of this line to compare with", true);
     pose();

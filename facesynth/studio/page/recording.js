@@ -3,7 +3,7 @@
 import { ask, on } from "/page/link.js";
 import { store, watch, changed, currentLine, motionOf, rowAt, say } from "/page/store.js";
 import * as sound from "/page/sound.js";
-import { Face } from "/page/face.js";
+import { openFace } from "/page/face.js";
 
 const list = document.getElementById("recording-utterance");
 const note = document.getElementById("recording-note");
@@ -12,7 +12,7 @@ let asked = null;
 let other = null; // the clock of a recording that plays by itself
 
 export async function begin() {
-  face = await new Face(document.getElementById("recording-canvas")).load();
+  face = await openFace(document.getElementById("recording-canvas"), note);
   list.addEventListener("change", () => open(list.value));
   document.getElementById("recording-play").addEventListener("click", () => playFrom(0, Infinity));
   watch("corpus", listUtterances);
@@ -26,7 +26,7 @@ export async function begin() {
     if (message.utterance === undefined || message.utterance !== asked) return;
     store.recording = { ...motionOf(message), utterance: message.utterance };
     mark();
-    note.textContent = "";
+    if (face) note.textContent = "";
     changed("recording");
   });
 }
@@ -68,7 +68,7 @@ function tick() {
     other = null;
     return pose();
   }
-  face.pose(rowAt(store.recording, now), store.recording.names);
+  face?.pose(rowAt(store.recording, now), store.recording.names);
   return requestAnimationFrame(tick);
 }
 

@@ -19,11 +19,12 @@ export const store = {
   before: null, // what it made before the last change
   compared: null, // another take
   recording: null, // the motion recorded with an utterance
+  markers: null, // of the head's skin
 };
 
 const listeners = new Map();
 
-/** Call `listener` when one of these changes: project, choice (line or take), selection, motion, choices, recording, jobs, corpus, time. */
+/** Call `listener` when one of these changes: project, choice (line or take), selection, motion, choices, recording, jobs, corpus, time, map (what is chosen or drawn on it). */
 export function watch(kinds, listener) {
   for (const kind of kinds.split(" ")) listeners.set(kind, [...(listeners.get(kind) ?? []), listener]);
 }
@@ -125,12 +126,12 @@ export function motionOf(message, known) {
   return { names, columns, count, fps, rows };
 }
 
-/** One column of a motion at a time, between its frames. */
-export function valueAt({ rows, columns, count, fps }, time, column) {
+/** What `read(rows, start)` makes of the row that begins at `start`, at a time between a motion's frames. */
+export function valueAt({ rows, columns, count, fps }, time, read) {
   const place = Math.min(Math.max(time * fps, 0), count - 1);
   const first = Math.floor(place);
-  const value = rows[first * columns + column];
-  return value + (place - first) * (rows[Math.min(first + 1, count - 1) * columns + column] - value);
+  const value = read(rows, first * columns);
+  return value + (place - first) * (read(rows, Math.min(first + 1, count - 1) * columns) - value);
 }
 
 /** The row of a motion at a time, between its frames. */

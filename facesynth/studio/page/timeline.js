@@ -5,6 +5,7 @@ import { store, watch, changed, currentTake, changeTake, startOf, indexAt, durat
 import * as sound from "/page/sound.js";
 import { trialAsked } from "/page/measure.js";
 import { view, x, at, all, beginning, zoom, scroll, follow, snapped } from "/page/view.js";
+import { make } from "/page/dom.js";
 import * as lanes from "/page/lanes.js";
 
 const canvas = document.getElementById("timeline-canvas");
@@ -106,9 +107,10 @@ function paint() {
 const shownTake = () => drag?.take ?? currentTake();
 
 function listCurves() {
-  if (!store.motion || curve.options.length === store.motion.names.length) return;
+  if (!store.motion || curve.options.length >= store.motion.names.length) return;
   const before = curve.value || "jawOpen";
-  curve.replaceChildren(...store.motion.names.map((name) => new Option(name, name, false, name === before)));
+  const group = (label, names) => make("optgroup", { label }, ...names.map((name) => new Option(name, name, false, name === before)));
+  curve.replaceChildren(group("Weights, 0 to 1", store.motion.names), ...(store.markers ? [group("Markers, ±15 mm", store.markers.curves)] : []));
 }
 
 function laneAt(y) {
