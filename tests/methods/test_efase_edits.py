@@ -139,6 +139,14 @@ def test_a_model_that_hears_can_be_edited(corpus, journal):
     np.testing.assert_array_equal(hearing.audio.sound.nodes, before)
 
 
+def test_a_drawn_node_may_be_removed_before_any_model_had_it(corpus, model, journal):
+    speech = corpus[corpus.ids[0]].speech
+    plain = model.synthesize(speech)
+    drawn = journal.add("aa", "neutral", np.zeros((4, corpus.layout.channels)))
+    journal.remove(drawn.name)
+    np.testing.assert_array_equal(model.synthesize(speech, edits=journal.sum()).frames, plain.frames)
+
+
 def test_edits_are_a_file_of_speak(corpus, model, tmp_path):
     speech, name = corpus[corpus.ids[0]].speech, model.facts["names"][0]
     path = tmp_path / "edits.jsonl"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sentences import CONFIDENCES, RATE, facts, project_with_line, sound
 
+from facesynth.corpus.journal import Journal
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.emotions import read_emotions
 from facesynth.speech.textgrid import read_textgrid
@@ -201,6 +202,37 @@ def test_what_cannot_be_done_is_told(tmp_path, do, what, said):
     with pytest.raises(FacesynthError, match=said):
         project.change(do, {**HERE, **what})
     assert project.revision == 1
+
+
+def node_of(title):
+    return {"title": title, "phone": "aa", "emotion": "neutral", "frames": [[0.0, 1.0], [0.5, 1.5]]}
+
+
+def test_a_corpus_takes_over_edits_once_and_what_is_undone_is_taken_back(tmp_path):
+    project, corpus = project_with_line(tmp_path / "p"), tmp_path / "corpus"
+    corpus.mkdir()
+    journal = Journal(corpus / "edits.jsonl")
+    project.change("draw_node", node_of("wide"))
+    project.change("remove_node", {"node": "s01_happy:4"})
+    assert project.keep_edits(corpus) == 2
+    with pytest.raises(FacesynthError, match="has all of these"):
+        project.keep_edits(corpus)
+    project.change("draw_node", node_of("round"))
+    project.change("restore_node", {"node": "s01_happy:4"})
+    assert project.keep_edits(corpus) == 2
+    assert journal.removed() == frozenset()
+    assert [(one.name, one.title) for one in journal.added()] == [(name, node.title) for name, node in project.drawn]
+    for _ in range(4):
+        project.change("undo", {})
+    project.close()
+    project = Project.open(tmp_path / "p")
+    project.keep_edits(corpus)
+    assert journal.added() == ()
+    assert Journal(project.edits).sum().added == ()
+    journal.remove("s02_sad:1")
+    project.change("remove_node", {"node": "s01_happy:5"})
+    with pytest.raises(FacesynthError, match="was changed elsewhere"):
+        project.keep_edits(corpus)
 
 
 def test_silence_that_was_made_is_one_silence_and_pins_follow_their_phones():

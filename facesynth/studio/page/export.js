@@ -19,9 +19,14 @@ export function begin() {
   watch("jobs", () => document.getElementById("export-jobs").replaceChildren(...jobRows("export")));
 }
 
+const MEANT = {
+  ".mp4": "video with sound", ".csv": "weights, head and eyes as Live Link Face writes them", ".glb": "the head with its animation",
+  ".npz": "the motion as arrays", ".bvh": "the turns of the head",
+};
+
 function open() {
   const kinds = store.outputs.map((suffix) =>
-    make("label", {}, make("input", { type: "checkbox", value: suffix, checked: [".mp4", ".csv"].includes(suffix) }), ` ${suffix}`));
+    make("label", {}, make("input", { type: "checkbox", value: suffix, checked: [".mp4", ".csv"].includes(suffix) }), ` ${suffix}${MEANT[suffix] ? `: ${MEANT[suffix]}` : ""}`));
   document.getElementById("export-kinds").replaceChildren(make("legend", { textContent: "Files" }), ...kinds);
   dialog.showModal();
 }
@@ -39,7 +44,7 @@ export function jobRows(titled = "") {
     const files = job.code === 0 && titled ? exported(job.command) : [];
     const cancel = job.code === null ? make("button", { textContent: "Cancel", onclick: () => ask("cancel", { number: job.number }).catch((e) => say(e.message, true)) }) : null;
     return make("div", { className: "job" }, make("strong", { textContent: `${job.title}: ${state} ` }), cancel,
-      make("div", {}, make("code", { textContent: job.command })), make("div", { textContent: job.lines.at(-1) ?? "" }), ...files);
+      make("div", {}, make("code", { textContent: job.command })), make("div", { textContent: job.code === 0 ? "" : (job.lines.at(-1) ?? "") }), ...files);
   });
 }
 

@@ -181,17 +181,17 @@ function showTable(take) {
   const rows = take.phones.slice(first, first + SHOWN).map(([label, end], n) => {
     const k = first + n;
     const quality = qualityOf(store.choices[k]);
-    const field = make("input", { type: "number", step: "0.001", value: end.toFixed(4), "aria-label": `End of phone ${k}`, disabled: k === take.phones.length - 1 });
+    const field = make("input", { type: "number", step: "0.001", value: end.toFixed(3), "aria-label": `End of phone ${k}`, disabled: k === take.phones.length - 1 });
     field.addEventListener("change", () => changeTake("move_boundary", { phone: k, end_s: Number(field.value) }));
     return make("tr", { className: k === store.phone ? "selected" : "" },
       make("td", {}, make("button", { textContent: k, "aria-label": `Choose phone ${k}`, onclick: () => choosePhone(k) })),
       make("td", {}, choice(PHONES, label, { "aria-label": `Label of phone ${k}`, onchange: (event) => changeTake("relabel", { phone: k, label: event.target.value }) }),
         (take.phones[k][2] ?? 1) < 1 ? make("span", { className: isDoubted(take.phones[k]) ? "doubted" : "", textContent: ` ${sureness(take.phones[k])}` }) : ""),
       make("td", { textContent: startOf(take, k).toFixed(3) }), make("td", {}, field),
-      make("td", { className: `quality ${quality ?? ""}`, textContent: quality ? `${QUALITY[quality].slice(0, 1)} ${store.choices[k].node}` : "" }),
-      make("td", { textContent: pins.get(k) ? "yes" : "" }));
+      make("td", { className: `quality ${quality ?? ""}` }, quality ? `${QUALITY[quality].slice(0, 1)} ${store.choices[k].node}` : "",
+        pins.get(k) ? make("div", { className: "note", textContent: "constrained" }) : null));
   });
-  const heads = ["Phone", "Label", "From", "To", "Node", "Constrained"].map((text) => make("th", { textContent: text, scope: "col" }));
+  const heads = ["No.", "Label", "From", "To", "Node"].map((text) => make("th", { textContent: text, scope: "col" }));
   return [make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...rows))];
 }
 
@@ -239,7 +239,7 @@ function showOptions(take) {
   return [...OF_SPEAK, ...(store.model?.options ?? [])].map((option) => {
     const value = take.options[option.name];
     const set = (chosen) => changeTake("set_option", { name: option.name, value: chosen });
-    return make("div", { className: "row" }, labelled(option.name.replaceAll("_", " "), optionField(option, value, set)),
+    return make("div", { className: "row option" }, labelled(option.name.replaceAll("_", " "), optionField(option, value, set)),
       make("button", { textContent: "Default", "aria-label": `Default ${option.name}`, disabled: value === undefined, onclick: () => set(null) }),
       make("span", { className: "note", textContent: option.help }));
   });

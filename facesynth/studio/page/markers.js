@@ -2,9 +2,9 @@
 
 import { THREE } from "/three.js";
 
-const RAISED_M = 0.0008; // above the skin, so that it does not hide them
+const RAISED_M = 0.0015; // above the skin, so that it does not hide them
 const AXES = { across: 0, up: 1, forward: 2 };
-const LARGEST_MM = 15; // from the middle of a lane to its edge
+export const LARGEST_MM = 20; // from the middle of a lane to its edge
 
 /** Points of a surface that are nearest to places at rest: `places` [[name, x, y, z], …] in mm, as the head is made. */
 export class Markers {
@@ -14,7 +14,7 @@ export class Markers {
     this.vertices = places.map(([, ...place]) => nearest(surface.rest, place));
     this.attribute = new THREE.BufferAttribute(new Float32Array(3 * places.length), 3).setUsage(THREE.DynamicDrawUsage);
     const geometry = new THREE.BufferGeometry().setAttribute("position", this.attribute);
-    this.points = new THREE.Points(geometry, new THREE.PointsMaterial({ color: 0x7fc4ff, size: 5, sizeAttenuation: false }));
+    this.points = new THREE.Points(geometry, new THREE.PointsMaterial({ color: 0xffd166, size: 4, sizeAttenuation: false }));
     this.points.frustumCulled = false;
     this.points.visible = false;
     node.add(this.points);

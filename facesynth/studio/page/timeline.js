@@ -6,6 +6,7 @@ import * as sound from "/page/sound.js";
 import { trialAsked } from "/page/measure.js";
 import { view, x, at, all, beginning, zoom, scroll, follow, snapped } from "/page/view.js";
 import { make } from "/page/dom.js";
+import { LARGEST_MM } from "/page/markers.js";
 import * as lanes from "/page/lanes.js";
 
 const canvas = document.getElementById("timeline-canvas");
@@ -98,7 +99,7 @@ function paint() {
   lanes.drawEmotions(c, layout.emotions, take);
   lanes.drawCurve(c, layout.curve, curve.value);
   c.fillStyle = lanes.COLOURS.soft;
-  c.fillText(curve.value, 6, layout.curve.top + 13);
+  c.fillText(`${curve.value}${store.markers?.curves.includes(curve.value) ? `, ±${LARGEST_MM} mm` : ", 0 to 1"}`, 6, layout.curve.top + 13);
   c.fillStyle = "#ffffff";
   c.fillRect(x(sound.time()) - 0.75, 0, 1.5, canvas.clientHeight);
 }
@@ -110,7 +111,7 @@ function listCurves() {
   if (!store.motion || curve.options.length >= store.motion.names.length) return;
   const before = curve.value || "jawOpen";
   const group = (label, names) => make("optgroup", { label }, ...names.map((name) => new Option(name, name, false, name === before)));
-  curve.replaceChildren(group("Weights, 0 to 1", store.motion.names), ...(store.markers ? [group("Markers, ±15 mm", store.markers.curves)] : []));
+  curve.replaceChildren(group("Weights, 0 to 1", store.motion.names), ...(store.markers ? [group(`Markers, ±${LARGEST_MM} mm`, store.markers.curves)] : []));
 }
 
 function laneAt(y) {
