@@ -17,7 +17,9 @@ RECORDINGS = Path(os.environ.get("FACESYNTH_DATA", Path(__file__).parents[2] / "
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Tests that share what was trained or built run in one process: those of a file, of `all_trained`, all of tests/export and of tests/studio.
+    """Tests that share what was trained or built run in one process.
+
+    Those of a file, of `all_trained`, and all of tests/export and of tests/studio.
 
     With `--dist loadgroup`, as `make test` says; else each process would build the fixtures of nearly every file anew.
     """

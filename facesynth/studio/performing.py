@@ -74,7 +74,8 @@ class Performing:
         if self._preview.stage.own is not None:
             return []
         layout = marker_layout(self._preview.stage.rig)
-        return [(name, *map(float, place)) for name, place in zip(layout.names, np.reshape(layout.neutral, (-1, 3)), strict=True)]
+        places = np.asarray(layout.neutral, np.float64).reshape(-1, 3).tolist()
+        return [(name, x, y, z) for name, (x, y, z) in zip(layout.names, places, strict=True)]
 
     def speech(self, sound: Path, line: Line, take: Take) -> Speech:
         """What a take says."""
