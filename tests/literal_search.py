@@ -1,5 +1,6 @@
 """The cost and Algorithm 1 of Deng 2008, pair by pair, in plain Python."""
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -58,10 +59,15 @@ def path_cost(nodes, query, path, weights):
     return float(targets + sum(transition_cost(nodes, int(i), int(j), weights) for i, j in pairwise(path)))
 
 
+@lru_cache(maxsize=2)
+def transition_costs(nodes, weights):
+    """[N from, N to]; the same nodes are asked again and again."""
+    return np.array([[transition_cost(nodes, i, j, weights) for j in range(len(nodes))] for i in range(len(nodes))])
+
+
 def literal(nodes, query, weights):
     """Algorithm 1 as written: the least cost, and its path of the lowest nodes."""
-    n, count = len(nodes), len(query)
-    steps = np.array([[transition_cost(nodes, i, j, weights) for j in range(n)] for i in range(n)])
+    steps, count = transition_costs(nodes, weights), len(query)
     phi, back = target_costs(nodes, query, 0, weights), []
     for t in range(1, count):
         total = phi[:, None] + steps

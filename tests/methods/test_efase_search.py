@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,16 +46,23 @@ def search(nodes, query, weights, engine="numpy"):
     return steps.path_cost(nodes, query, path, weights), path
 
 
+@cache
+def literally_searched(pnt, fixed):
+    """Twelve random databases, each with a query, and its least cost and path: both engines meet them."""
+    rng, found = np.random.default_rng(int(pnt * 10) + fixed), []
+    for _ in range(12):
+        nodes = random_nodes(rng)
+        query = random_query(rng, nodes, int(rng.integers(2, 12)), fixed=fixed)
+        found.append((nodes, query, *literal(nodes, query, Weights(pnt))))
+    return found
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("pnt", [0.01, 1.0, 30.0, 1000.0])
 @pytest.mark.parametrize("fixed", [0, 2])
 def test_equals_the_literal_algorithm_on_random_databases(pnt, fixed, engine):
-    rng = np.random.default_rng(int(pnt * 10) + fixed)
-    for _ in range(12):
-        nodes = random_nodes(rng)
-        query = random_query(rng, nodes, int(rng.integers(2, 12)), fixed=fixed)
-        weights = Weights(pnt)
-        cost, path = literal(nodes, query, weights)
+    weights = Weights(pnt)
+    for nodes, query, cost, path in literally_searched(pnt, fixed):
         found, nodes_found = search(nodes, query, weights, engine)
         np.testing.assert_allclose(found, cost, rtol=1e-9)
         np.testing.assert_allclose(path_cost(nodes, query, nodes_found, weights), cost, rtol=1e-9)
