@@ -1,16 +1,16 @@
 """Models by name, driven by a voice that none of them learned from: python benchmarks/models_for_strangers.py STRANGER/ [MODEL …]
 
 STRANGER is a corpus of somebody else, such as GRID s26 from video; MODEL a name or a file, all that `facesynth models` lists
-where none is given. Openings of the lips against the stranger's own, from the first to the last phone: mean correlation over
-the clips with the words known (phones placed by a transcript) and with nothing known (phones heard in the sound); then, with the
-words known, the share of clips whose openings have 0.85 to 1.15 of the stranger's standard deviation after one gain for all, and
-the share of p, b and m at which the lips shut. `loudness` is the logarithm of the sound's level, smoothed as a jaw moves: what
-anybody has without a model.
+where none is given. Openings of the lips against the stranger's own: mean correlation over the clips with the words known (phones
+placed by a transcript) and with nothing known (phones heard in the sound), over whole clips, with the rest before and after, and
+from the first to the last phone; then, with the words known and in speech, the share of clips whose openings have 0.85 to 1.15 of
+the stranger's standard deviation after one gain for all, and the share of p, b and m at which the lips shut. `loudness` is the
+logarithm of the sound's level, smoothed as a jaw moves: what anybody has without a model.
 """
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from facesynth.motion.resample import resample
 from facesynth.speech.phone_sources import find_phones
 from facesynth.zoo.shelf import entry, load, names
 
+COLUMNS = ("whole clip, words known", "nothing known", "in speech, words known", "nothing known", "as wide", "shut at p, b, m")
 ALIKE = 0.15
 LEVEL_S = 0.05
 """Standard deviation of the smoothing of the sound's level."""
@@ -37,13 +38,17 @@ Opening = Callable[[Speech], tuple[NDArray[np.float64], float]]
 
 @dataclass(frozen=True)
 class Row:
+    """Correlations with the words known and unknown, of whole clips and in speech, and two shares."""
+
+    known_whole: float
+    unknown_whole: float
     known: float
     unknown: float
     alike: float
     shut: float
 
     def __str__(self) -> str:
-        return f"{self.known:.2f} | {self.unknown:.2f} | {self.alike:.2f} | {self.shut:.2f}"
+        return " | ".join(f"{figure:.2f}" for figure in astuple(self))
 
 
 def main(stranger: Path, models: list[str]) -> None:
@@ -52,10 +57,8 @@ def main(stranger: Path, models: list[str]) -> None:
     heard = [replace(u, speech=unknown(u.speech)) for u in said]
     truth = [lips_of(lip_opening(u.motion), u.motion.fps) for u in said]
     share = share_shut(truth, said)
-    print(
-        f"{corpus.performer}, {len(said)} clips\n\n| model | words known | nothing known | movement as wide | shut at p, b, m |"
-    )
-    print("|---|---:|---:|---:|---:|")
+    print(f"{corpus.performer}, {len(said)} clips\n\n| model | {' | '.join(COLUMNS)} |")
+    print("|---" + len(COLUMNS) * "|---:" + "|")
     for name in models or [name for name in names() if entry(name).part == "mouth"]:
         print(f"| {name} | {judged(opening_of(name), said, heard, truth, share)} |", flush=True)
     print(f"| loudness | {judged(loudness, said, heard, truth, share)} |")
@@ -86,14 +89,16 @@ def loudness(speech: Speech) -> tuple[NDArray[np.float64], float]:
 
 
 def judged(opening: Opening, said: list[Utterance], heard: list[Utterance], truth: list[Motion], share: float) -> Row:
-    whole, unknown_ = spoken(opening, said), cut(spoken(opening, heard), said)
+    whole, unknown_ = spoken(opening, said), spoken(opening, heard)
+    wholes = (correlation(whole, truth), correlation(unknown_, truth))
     narrow, wide = openings(whole)
     shut = [closed(made, u, narrow + share * (wide - narrow)) for made, u in zip(whole, said, strict=True)]
     known, truth = cut(whole, said), cut(truth, said)
     ours, theirs = (np.concatenate([lip_opening(m) - lip_opening(m).mean() for m in set_]) for set_ in (known, truth))
     each = np.array([lip_opening(m).std() / lip_opening(t).std() for m, t in zip(known, truth, strict=True)])
     alike = np.abs(each * theirs.std() / ours.std() - 1) <= ALIKE
-    return Row(correlation(known, truth), correlation(unknown_, truth), float(alike.mean()), float(np.nanmean(shut)))
+    inside = (correlation(known, truth), correlation(cut(unknown_, said), truth))
+    return Row(*wholes, *inside, float(alike.mean()), float(np.nanmean(shut)))
 
 
 def spoken(opening: Opening, said: list[Utterance]) -> list[Motion]:

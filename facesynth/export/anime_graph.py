@@ -6,18 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings
+from facesynth.export.expectation import expectation_graph, hearing_graphs, predictor_arrays, predictor_settings
 from facesynth.export.folder import Content
 from facesynth.export.motion_graphs import decode_graph, emotion_maps_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
-from facesynth.export.speech_graphs import log_mel_graph, rasta_plp_stream_graph
+from facesynth.export.speech_graphs import rasta_plp_stream_graph
 from facesynth.inference.anime_graph.graph import Graph
 from facesynth.inference.anime_graph.hearing import RATE
 from facesynth.inference.closures import LONGEST_CLOSING_S
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
-from facesynth.methods.learn.expectation import BANDS
-from facesynth.speech.mel import LogMel
 
 
 def anime_graph_content(model: AnimeGraph) -> Content:
@@ -43,7 +41,7 @@ def anime_graph_content(model: AnimeGraph) -> Content:
     if model.predictor is not None:
         told = {"expectation": predictor_settings(model.predictor)}
         arrays |= predictor_arrays(model.predictor)
-        graphs += [expectation_graph(model.predictor, unit), log_mel_graph(LogMel(bands=BANDS))]
+        graphs += [expectation_graph(model.predictor, unit), *hearing_graphs(model.predictor.hearing)]
     return Content(
         graphs=tuple(graphs),
         settings={

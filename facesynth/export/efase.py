@@ -8,18 +8,23 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, residual_arrays, sound_arrays
+from facesynth.export.expectation import (
+    expectation_graph,
+    hearing_graphs,
+    predictor_arrays,
+    predictor_settings,
+    residual_arrays,
+    sound_arrays,
+)
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph
 from facesynth.export.motion_graphs import decode_graph, encode_graph
 from facesynth.export.path_search import path_search_graph
-from facesynth.export.speech_graphs import log_mel_graph
 from facesynth.inference.efase.bounds import step_bounds
 from facesynth.inference.efase.exported import stored_nodes
 from facesynth.inference.efase.nodes import COLUMNS
 from facesynth.inference.efase.stream import GUARD_S
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.learn.expectation import BANDS
 from facesynth.speech.mel import LogMel
 
 LATENCY = {
@@ -93,6 +98,6 @@ def _hearing(model: Efase) -> tuple[dict[str, NDArray[Any]], list[Graph]]:
     if model.audio.predictor is not None:
         arrays |= predictor_arrays(model.audio.predictor)
         graphs.append(expectation_graph(model.audio.predictor, model.fitted_layout.unit))
-    if not model.audio.empty:
-        graphs.append(log_mel_graph(LogMel(bands=BANDS)))
+    if (learned := model.audio.sound or model.audio.predictor) is not None:
+        graphs += hearing_graphs(learned.hearing)
     return arrays, graphs

@@ -7,6 +7,8 @@ import torch
 from numpy.typing import NDArray
 
 from facesynth.export.graph import Arrays, Graph, Port
+from facesynth.export.phones import phone_net_graph
+from facesynth.export.speech_graphs import log_mel_graph
 from facesynth.graph_builder import Builder
 from facesynth.inference.efase.exported import SOUND
 from facesynth.inference.residual import ARRAYS
@@ -40,6 +42,12 @@ def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
 
     about = "the pose that sound, phones and emotion lead one to expect"
     return Graph("expectation", about, b.model(), (heard,), (port,), example, reference)
+
+
+def hearing_graphs(hearing: Hearing) -> tuple[Graph, ...]:
+    """What it hears with."""
+    log_mel = () if hearing.features == "phone_net" else (log_mel_graph(hearing.mel),)
+    return log_mel + (() if hearing.features == "log_mel" else (phone_net_graph(),))
 
 
 def _changed(b: Builder, value: str, block: CausalBlock) -> str:

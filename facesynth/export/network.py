@@ -1,23 +1,16 @@
 """The network of poses as graphs: sound to bands, and what is told of them to frames."""
 
-from facesynth.export.expectation import expectation_graph, predictor_arrays, predictor_settings, residual_arrays
+from facesynth.export.expectation import expectation_graph, hearing_graphs, predictor_arrays, predictor_settings, residual_arrays
 from facesynth.export.folder import Content
-from facesynth.export.speech_graphs import log_mel_graph
-from facesynth.inference.errors import FacesynthError
-from facesynth.methods.learn.expectation import BANDS
 from facesynth.methods.network.method import Network
 from facesynth.speech.mel import LogMel
 
 
 def network_content(model: Network) -> Content:
     """Everything that the runtime needs of a trained network; `inference.network.load_network` reads it."""
-    if model.predictor.hearing.features != "log_mel":
-        raise FacesynthError(
-            f"this network hears {model.predictor.hearing.features}; export one that was trained with features=log_mel"
-        )
     speaker, unit = model.speaker(), model.fitted_layout.unit
     return Content(
-        graphs=(expectation_graph(model.predictor, unit), log_mel_graph(LogMel(bands=BANDS))),
+        graphs=(expectation_graph(model.predictor, unit), *hearing_graphs(model.predictor.hearing)),
         settings={
             "expectation": predictor_settings(model.predictor),
             "sharpening": model.config["sharpening"],

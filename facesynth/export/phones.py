@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.export.folder import Content, Subject, write_folder
-from facesynth.export.graph import Graph, Port
+from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.export.weights import Weights, stored_as
 from facesynth.inference.ear import FRAMES_PER_S, RATE, STEP, WHOLE
+from facesynth.inference.heard import HIDDEN_LAYER
 from facesynth.speech.phone_archive import NOTICE, read_archive
-from facesynth.speech.phone_graph import OUTPUTS, alphabet_of, phone_graph
+from facesynth.speech.phone_graph import OUTPUTS, alphabet_of, hidden_graph, phone_graph
 from facesynth.speech.phone_network import phone_network
 from facesynth.speech.phone_weights import BLOCKS, WIDTH, network_weights
 
@@ -24,6 +25,19 @@ def export_phones(folder: str | Path, weights: Weights = "float32") -> dict[str,
     content = Content((phone_network_graph(),), settings, latency, RATE)
     data = {"performer": "unknown", "licences": ["Apache-2.0 (weights)"], "consents": ["not stated by hama 1.7.0"]}
     return write_folder(folder, Subject("phones", data, None, None, ()), stored_as(content, weights))
+
+
+def phone_net_graph() -> Graph:
+    """The network up to the layer that others hear with."""
+    network, weights = phone_network(), network_weights(read_archive())
+    sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", RATE)
+    hidden = Port(OUTPUTS[1], "float32", ("batch", "frames", WIDTH), "none", FRAMES_PER_S)
+
+    def reference(arrays: Arrays) -> list[NDArray[Any]]:
+        return [network.part(**arrays)[1][:, :, HIDDEN_LAYER]]
+
+    about = "what the third Conformer block of a network that hears phones makes of the sound"
+    return Graph("phone_net", about, hidden_graph(weights, HIDDEN_LAYER).model(), (sound,), (hidden,), _sound, reference)
 
 
 def phone_network_graph() -> Graph:

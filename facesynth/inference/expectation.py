@@ -16,6 +16,7 @@ from .errors import unknown
 from .filters import cubic_at
 from .folder import Folder
 from .graphs import Graph
+from .heard import exported_hear
 from .phones import PHONES
 from .sound import resample
 from .speech import NEUTRAL, Speech
@@ -56,11 +57,16 @@ class Standard:
 
     def at(self, bands: Single, times_s: Floats) -> Single:
         """[..., B] bands [F, B] at times [...] in seconds, linear between frames, held at the ends."""
-        at = np.clip(times_s * BANDS_FPS, 0, len(bands) - 1)
-        low = at.astype(np.int64)
-        share = (at - low).astype(np.float32)[..., None]
-        here, there = bands[low], bands[np.minimum(low + 1, len(bands) - 1)]
-        return np.asarray((here + share * (there - here) - self.mean) / self.deviation, np.float32)
+        found = linear_at(bands, np.clip(times_s * BANDS_FPS, 0, len(bands) - 1))
+        return np.asarray((found - self.mean) / self.deviation, np.float32)
+
+
+def linear_at(bands: NDArray[Any], at: Floats) -> Single:
+    """[..., B] rows of [F, B] at places [...] between 0 and F - 1."""
+    low = at.astype(np.int64)
+    share = (at - low).astype(np.float32)[..., None]
+    here, there = (np.asarray(bands[rows], np.float32) for rows in (low, np.minimum(low + 1, len(bands) - 1)))
+    return np.asarray(here + share * (there - here), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,15 +168,10 @@ class Expectation:
         return self.network(told)[self.before + self.ahead :].astype(np.float64)
 
 
-def exported_bands(folder: Folder, threads: int, graph: str = "log_mel") -> Bands:
-    """The bands of a graph of a folder."""
-    run = Graph(folder, graph, threads)
-
-    def bands(speech: Speech) -> Single:
-        sound = resample(speech.audio, speech.sample_rate, RATE)
-        return np.asarray(run(audio=sound[None])[0][0], np.float32)
-
-    return bands
+def exported_bands(folder: Folder, threads: int) -> Bands:
+    """What the graphs of a folder hear in a speech."""
+    hear = exported_hear(folder, threads)
+    return lambda speech: hear(resample(speech.audio, speech.sample_rate, RATE))
 
 
 def exported_expectation(folder: Folder, arrays: Mapping[str, NDArray[Any]], threads: int) -> Expectation:

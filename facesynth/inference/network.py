@@ -13,7 +13,7 @@ from .errors import FacesynthError, reject_options, unknown
 from .expectation import BANDS_FPS, BEYOND, EACH, RATE, Expectation, Said, Single, exported_expectation
 from .filters import cubic_at, sharpen
 from .folder import Folder
-from .graphs import Graph
+from .heard import exported_hear
 from .layout import Layout
 from .lips import bilabial_spans
 from .motion import Motion
@@ -46,6 +46,8 @@ class Network:
     """How near the lips come at a p, b or m; infinite where they are left as they are."""
     residual: ResidualMotion | None = None
     """What moves beside the lips, whatever is said."""
+    streams: bool = True
+    """Whether what it hears of a piece of sound is the same in a stream: true of log-mel bands alone."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that it comes from."""
 
@@ -69,9 +71,11 @@ class Network:
     def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> "SoundStream":
         """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
 
-        FacesynthError for a model that is told phones, which a stream does not know. A stream is not sharpened, closes no
-        lips, and adds no residual motion.
+        FacesynthError for a model that is told phones, which a stream does not know, or hears more than log-mel bands. A
+        stream is not sharpened, closes no lips, and adds no residual motion.
         """
+        if not self.streams:
+            raise FacesynthError("this network hears whole utterances; for a stream train one with features=log_mel, phones=false")
         if self.expectation.reading.phones:
             raise FacesynthError("this network is told what is said and wants whole utterances; train one with phones=false")
         felt = (NEUTRAL if NEUTRAL in self.emotions else self.emotions[0]) if emotion is None else emotion
@@ -159,19 +163,16 @@ class SoundStream:
 def load_network(folder: Folder, threads: int) -> Network:
     """The model in a folder that `network_content` filled."""
     manifest, settings, arrays = folder.manifest, folder.settings, folder.arrays()
-    graph, gap = Graph(folder, "log_mel", threads), settings["closed_gap"]
-
-    def hear(sound: Single) -> Single:
-        return np.asarray(graph(audio=sound[None])[0][0], np.float32)
-
+    gap = settings["closed_gap"]
     return Network(
         folder.layout,
         float(manifest["fps"]),
         tuple(manifest["emotions"]),
-        hear,
+        exported_hear(folder, threads),
         exported_expectation(folder, arrays, threads),
         sharpening=float(settings["sharpening"]),
         closed_gap=np.inf if gap is None else float(gap),
         residual=exported_residual(folder, arrays),
+        streams=set(folder.manifest["graphs"]) == {"expectation", "log_mel"},
         manifest=manifest,
     )

@@ -52,6 +52,16 @@ def _phones_of(token: str) -> tuple[str, ...]:
         return tuple(phone for letter in token for phone in _phones_of(letter)) if len(token) > 1 else ()
 
 
+def hidden_graph(weights: Weights, layer: int) -> Builder:
+    """Sound [B, S] to the output [B, T, WIDTH] of one of the blocks alone, T = 1 + S // STEP."""
+    b = Builder("phone_net")
+    x = _stem(b, weights, b.input("audio", "float32", ("batch", "samples")))
+    for number in range(layer + 1):
+        x = _block(b, weights, f"blocks.{number}.", x)
+    b.output(x, OUTPUTS[1], "float32", ("batch", "frames", WIDTH))
+    return b
+
+
 def phone_graph(weights: Weights) -> Builder:
     """Sound [B, S] to log-probabilities [B, T, V] and the blocks' outputs [B, T, BLOCKS, WIDTH], T = 1 + S // STEP."""
     b = Builder("phones")

@@ -46,6 +46,7 @@ from facesynth.methods.anime_graph.split import NOTHING_SPLIT, Split, split_comp
 from facesynth.methods.anime_graph.torch_search import torch_search
 from facesynth.methods.capabilities import Account
 from facesynth.methods.learn.expectation import PosePredictor
+from facesynth.methods.learn.hearing import Features
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.rbf import Kernel
@@ -83,6 +84,10 @@ class AnimeGraph(Method):
         of the graph meanwhile (`prepared`).
     help_pairs : bool
         Whether a recorded pair of the two phones helps to bridge a jump; without, every jump is a cross-fade.
+    features : str
+        What poses are expected from: `log_mel`, `phone_net` or `both`.
+    voices : int
+        From how many changed sounds of each recording poses are learned as well; see `PosePredictor`.
     """
 
     cutoffs_hz: torch.Tensor
@@ -104,6 +109,8 @@ class AnimeGraph(Method):
         pose_weight: float = 0.0,
         sharpening: float = 0.0,
         learn: bool = False,
+        features: Features = "log_mel",
+        voices: int = 0,
     ) -> None:
         super().__init__()
         for name, value in (("temperature", temperature), ("pose_weight", pose_weight), ("sharpening", sharpening)):
@@ -112,7 +119,7 @@ class AnimeGraph(Method):
         self.audio = AudioFeatures(parameters)
         self.components = FaceComponents()
         self.maps = EmotionMaps()
-        self.predictor = PosePredictor() if pose_weight > 0 else None
+        self.predictor = PosePredictor(features, voices=voices) if pose_weight > 0 else None
         self.map_settings = MapSettings(map_width, map_kernel, map_centres)
         self.nodes = nn.Module()
         self._chooser: Chooser | None = None

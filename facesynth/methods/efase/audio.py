@@ -15,6 +15,7 @@ from facesynth.inference.efase.hearing import Hearing, PhoneSounds, PoseDistance
 from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.learn.expectation import BANDS, PosePredictor
+from facesynth.methods.learn.hearing import Features
 from facesynth.methods.learn.hearing import Hearing as Bands
 from facesynth.motion.pca import Pca
 
@@ -30,9 +31,9 @@ class PhoneSound(nn.Module):
     size: Tensor
     """[A] what each component is divided by."""
 
-    def __init__(self) -> None:
+    def __init__(self, features: Features = "log_mel") -> None:
         super().__init__()
-        self.hearing = Bands(bands=BANDS)
+        self.hearing = Bands(features, BANDS)
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.register_buffer("nodes", torch.zeros(0, 0))
         self.register_buffer("size", torch.ones(0))
@@ -83,12 +84,12 @@ def _with_means(vectors: NDArray[np.float32], recorded: NDArray[np.bool_], phone
 
 
 class AudioTerms(nn.Module):
-    """Both terms; each is learned where it has a weight."""
+    """Both terms; each is learned where it has a weight. Both hear the same features; voices: see `PosePredictor`."""
 
-    def __init__(self, *, audio: bool, pose: bool) -> None:
+    def __init__(self, *, audio: bool, pose: bool, features: Features = "log_mel", voices: int = 0) -> None:
         super().__init__()
-        self.sound = PhoneSound() if audio else None
-        self.predictor = PosePredictor() if pose else None
+        self.sound = PhoneSound(features) if audio else None
+        self.predictor = PosePredictor(features, voices=voices) if pose else None
 
     def learn(self, corpus: Corpus, pca: Pca, names: tuple[str, ...], phones: Ints, seed: int) -> None:
         """From the corpus that the nodes were cut from."""

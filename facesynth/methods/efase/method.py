@@ -34,6 +34,7 @@ from facesynth.methods.efase.edits import Changed, EditsEditor, changed_nodes, e
 from facesynth.methods.efase.maps import Decode, cluster_of, frames_of, map_beside, mapped_phones, places_of_all
 from facesynth.methods.efase.penalty import median_transition
 from facesynth.methods.efase.torch_search import torch_engine, torch_mix
+from facesynth.methods.learn.hearing import Features
 from facesynth.methods.learn.residual import Residual
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
@@ -62,7 +63,9 @@ class Efase(Method):
 
     With `learn`, training starts from these weights and learns all that are above 0 on sentences of the corpus that it
     keeps out of the database meanwhile (see `learning`) before it fits with what it found. With `maps`, the Isomap of each
-    phone's frames is kept in the model (8 bytes a frame); without, it is made when it is asked for.
+    phone's frames is kept in the model (8 bytes a frame); without, it is made when it is asked for. `features` (`log_mel`,
+    `phone_net` or `both`) are what sounds are compared by and poses expected from, and poses are learned from `voices` changed
+    sounds of each recording as well (see `PosePredictor`).
     """
 
     pca: Pca
@@ -101,6 +104,8 @@ class Efase(Method):
         residual: float = 0.0,
         learn: bool = False,
         maps: bool = True,
+        features: Features = "log_mel",
+        voices: int = 0,
     ) -> None:
         super().__init__()
         lowest = min(temperature, audio_weight, pose_weight, sharpening, residual)
@@ -110,7 +115,7 @@ class Efase(Method):
                 f"got {lowest:g} and {candidates}"
             )
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
-        self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0)
+        self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0, features=features, voices=voices)
         self.residual = Residual() if residual > 0 else None
         self._speaker: Speaker | None = None
         self._edited: tuple[Any, Self] | None = None

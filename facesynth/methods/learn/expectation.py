@@ -6,16 +6,22 @@ captured nodes fit what is heard.
 
 from collections.abc import Callable
 from copy import deepcopy
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.expectation import Expectation, Reading, Said, Single, rate_of
+from facesynth.inference.expectation import RATE, Expectation, Reading, Said, Single, linear_at, rate_of
 from facesynth.inference.layout import Layout
+from facesynth.inference.sound import resample
+from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
+from facesynth.methods.learn.other_voices import other_voice
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
 from facesynth.methods.learn.windows import Recording, Windows
@@ -31,6 +37,9 @@ STEPS = 700
 LEARNING_RATE, WEIGHT_DECAY, WARMING = 2e-3, 1e-2, 0.1
 """The rate rises over this share of the steps and then falls along a cosine."""
 LARGEST_GRADIENT = 1.0
+OTHER_VOICES = 17
+"""Beside the seed: of the draws that change sounds."""
+Bands = NDArray[Any]
 AVERAGED, SETTLING = 0.99, 10
 """Weights are averaged over about a hundred steps, fewer at the start."""
 
@@ -42,6 +51,7 @@ class PosePredictor(nn.Module):
     sound after a frame it may hear; None for as much as it hears before (0.7 s at 25 frames a second).
     """
 
+    heard_phones: dict = {}
     fps: Tensor
     """[1] rate of the motion that was learned, Hz."""
     emotion_count: Tensor
@@ -55,9 +65,11 @@ class PosePredictor(nn.Module):
     metric: Tensor
     """[D] how much a squared difference of each coordinate counts."""
 
-    def __init__(self, features: Features = "log_mel", *, phones: bool = True, look_ahead_s: float | None = None) -> None:
+    def __init__(
+        self, features: Features = "log_mel", *, phones: bool = True, look_ahead_s: float | None = None, voices: int = 0
+    ) -> None:
         super().__init__()
-        self.phones, self.look_ahead_s = phones, look_ahead_s
+        self.phones, self.look_ahead_s, self.voices = phones, look_ahead_s, voices
         self.hearing = Hearing(features, BANDS)
         self.pca = _no_components()
         self.network = PoseNetwork(1, 1)
@@ -83,13 +95,31 @@ class PosePredictor(nn.Module):
         device = self.scale.device
         self.fps = torch.full_like(self.fps, corpus.fps)
         self.emotion_count = torch.full_like(self.emotion_count, len(corpus.emotions))
-        self.hearing.learn(corpus)
+        heard = self.heard(corpus, seed)
+        self.hearing.standardise(bands for each in heard for bands in each)
         frames = complete_frames(corpus)
         self.pca = Pca.fit(frames, COMPONENTS).to(device)
         self.scale = self.pca.encode(torch.from_numpy(frames).to(device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
         self.into, self.onto = self.scale * self.pca.basis.T, self.pca.mean.clone()
         self.network = PoseNetwork(self.reading.width, self.pca.basis.shape[1], seed=seed).to(device)
-        return Windows([self.recording(utterance, corpus.emotions) for utterance in corpus], self.reading, self.ahead)
+        recordings = [self.recording(*one, corpus.emotions) for one in zip(corpus, heard, strict=True)]
+        return Windows(recordings, self.reading, self.ahead)
+
+    def heard(self, corpus: Corpus, seed: int) -> list[list[Bands]]:
+        """Features [F, B] of each recording, and of `voices` changed sounds of it."""
+        rng = np.random.default_rng([seed, OTHER_VOICES])
+        return [self._heard(utterance.speech, rng) for utterance in track(corpus, "listening", len(corpus))]
+
+    def _heard(self, speech: Speech, rng: np.random.Generator) -> list[Bands]:
+        own = self.hearing.bands(speech)
+        sound = resample(speech.audio, speech.sample_rate, RATE)
+        others = []
+        for _ in range(self.voices):
+            changed, speed = other_voice(sound, rng)
+            bands = self.hearing.of_sound(changed)
+            at = np.clip(np.arange(len(own)) / speed, 0, len(bands) - 1)
+            others.append(linear_at(bands, at).astype(np.float16))
+        return [own, *others]
 
     def loss(self, layout: Layout) -> PointLoss:
         """What is to be made small."""
@@ -126,13 +156,17 @@ class PosePredictor(nn.Module):
 
         return Expectation(predict, self.reading, REACH, self.ahead)
 
-    def recording(self, utterance: Utterance, emotions: tuple[str, ...]) -> Recording:
+    def recording(self, utterance: Utterance, heard: list[Bands], emotions: tuple[str, ...]) -> Recording:
         """What one utterance teaches."""
         frames, present = utterance.motion.frames, complete(utterance.motion.frames)
         filled = np.where(present[:, None], frames, self.pca.mean.cpu().numpy())
         poses = self.pca.encode(torch.from_numpy(filled.astype(np.float32)).to(self.scale.device)) / self.scale
-        bands, said = self.hearing.bands(utterance.speech), Said.of(utterance.speech, emotions)
-        return Recording(bands, said, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps)
+        said = Said.of(utterance.speech, emotions)
+        again = self.heard_phones.get(utterance.id)
+        heard_ = None if again is None else Said.of(replace(utterance.speech, phones=again), emotions)
+        return Recording(
+            heard[0], tuple(heard[1:]), said, heard_, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps
+        )
 
 
 def _no_components() -> Pca:

@@ -1,5 +1,6 @@
 """What the regressions hear: standardised log-mel bands, or hidden layers of the phone network, around a time."""
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -8,9 +9,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus
-from facesynth.inference.ear import Ear
 from facesynth.inference.errors import unknown
 from facesynth.inference.expectation import Standard
+from facesynth.inference.heard import hidden_layer
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.speech.mel import LogMel
@@ -21,8 +22,6 @@ Features = Literal["log_mel", "phone_net", "both"]
 BANDS = 40
 """Log-mel bands, unless told otherwise."""
 WIDTHS = {"log_mel": BANDS, "phone_net": WIDTH, "both": BANDS + WIDTH}
-HIDDEN_LAYER = 2
-"""The third block's output: it tells visemes best of the four, for speakers that a regression never heard."""
 
 
 class Hearing(nn.Module):
@@ -49,9 +48,13 @@ class Hearing(nn.Module):
 
     def learn(self, corpus: Corpus) -> None:
         """Take mean and deviation of each feature from all sounds of a corpus."""
+        self.standardise(self.bands(utterance.speech) for utterance in corpus)
+
+    def standardise(self, heard: Iterable[NDArray[Any]]) -> None:
+        """The same from features [F, W] of any sounds."""
         count, total, squares = 0, np.zeros(self.width), np.zeros(self.width)
-        for utterance in corpus:
-            bands = self.bands(utterance.speech).astype(np.float64)
+        for each in heard:
+            bands = each.astype(np.float64)
             count, total, squares = count + len(bands), total + bands.sum(axis=0), squares + np.square(bands).sum(axis=0)
         mean = torch.from_numpy(total / count)
         self.mean = mean.float().to(self.mean.device)
@@ -73,15 +76,6 @@ class Hearing(nn.Module):
     def of_sound(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same of sound [S] at 16 kHz."""
         if self.features == "phone_net":
-            return _hidden(audio, 1 + len(audio) // self.mel.hop)
+            return hidden_layer(phone_network().part, audio)
         heard: NDArray[Any] = self.mel(torch.from_numpy(audio).to(self.mel.window.device)).cpu().numpy()
-        return heard if self.features == "log_mel" else np.hstack([heard, _hidden(audio, len(heard))])
-
-
-def _hidden(audio: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-    """[count, WIDTH] the network's hidden layer, which has a frame every 20 ms, linear between its frames."""
-    _, hidden = Ear(phone_network().part).hear(audio)
-    layer = hidden[:, HIDDEN_LAYER]
-    between = np.vstack([(layer[:-1] + layer[1:]) / 2, layer[-1:]])
-    doubled = np.stack([layer, between], axis=1).reshape(-1, layer.shape[1])
-    return np.asarray(doubled[np.minimum(np.arange(count), len(doubled) - 1)], np.float32)
+        return heard if self.features == "log_mel" else np.hstack([heard, hidden_layer(phone_network().part, audio)])
