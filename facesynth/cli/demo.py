@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from facesynth.inference.speech import Speech
     from facesynth.methods.method import Method
     from facesynth.speech.segments import Segment
-    from facesynth.stage.performance import Performance
+    from facesynth.stage.performance import HeadStage, Performance
 
 
 class Clock:
@@ -49,7 +50,8 @@ class Clock:
 @click.option("--size", type=Size(), show_default="1280x720", help="Of the video.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -> None:
-    """Build the synthetic performer, train a method on it and let it say a sentence that goes through three emotions.
+    """Let the model that speaks for anybody say a sentence; then build the synthetic performer, train a method on it and let
+    that say it through three emotions.
 
     The performer and the model are kept in the user's cache, so that a second run only speaks.
     """
@@ -60,22 +62,36 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
 
     request = Request(seed=seed, size=size)
     clock = Clock()
+    speech, _ = demo_speech(seed)
+    clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
+    stage = HeadStage.of(request)
+    first = _said_by_default(output, speech, stage)
+    clock.step("first", f"{first}: {first.stem}, which comes with facesynth; `facesynth models` lists it and others")
     corpus = build_performer("small", seed=seed)
     clock.step("corpus", f"synthetic performer {corpus.performer}: {len(corpus)} utterances")
     model, fresh = trained_model(corpus, seed)
     clock.step("train", f"{model.name}: {model.capabilities.summary}")
-    speech, _ = demo_speech(seed)
-    clock.step("speech", f"{speech.duration_s:.1f} s of new speech: {', '.join(speech.emotions.labels)}")
-    stage = HeadStage.of(request)
     performance = stage.perform(model.synthesize(speech, seed=seed), speech, Cast(model))
     clock.step("motion", f"{len(performance.motion)} frames of motion at {performance.motion.fps:g} fps, on the head")
-    written = [output / f"demo{suffix}" for suffix in (".csv", ".glb", ".npz", ".mp4")]
-    for path in written:
+    made = [output / f"demo{suffix}" for suffix in (".csv", ".glb", ".npz", ".mp4")]
+    for path in made:
         performance.write(path)
         clock.step(path.suffix, f"{path}: {path.stat().st_size / 1e6:.1f} MB")
-    written.append(_strip(output / "demo.png", performance, stage.rig))
-    clock.step(".png", f"{written[-1]}: one picture of each emotion")
-    _report(clock, written, fresh, corpus.path, as_json)
+    made.append(_strip(output / "demo.png", performance, stage.rig))
+    clock.step(".png", f"{made[-1]}: one picture of each emotion")
+    _report(clock, [first, *made], fresh, corpus.path, as_json)
+
+
+def _said_by_default(output: Path, speech: Speech, stage: HeadStage) -> Path:
+    """A video of the model of those who name none: a face before anything is learned."""
+    from facesynth.inference.speech import EmotionTrack
+    from facesynth.stage.cast import Cast
+    from facesynth.zoo.shelf import DEFAULT, load
+
+    model, path = load(), output / f"{DEFAULT}.mp4"
+    plain = replace(speech, emotions=EmotionTrack.constant(model.emotions[0], speech.duration_s))
+    stage.perform(model.synthesize(plain), plain, Cast(model)).write(path)
+    return path
 
 
 def _strip(path: Path, performance: Performance, rig: Rig) -> Path:

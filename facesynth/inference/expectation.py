@@ -113,10 +113,14 @@ class Reading:
     @property
     def width(self) -> int:
         """W, how many numbers a frame is told by."""
-        said = len(PHONES) + 2 if self.phones else 0
-        return EACH * len(self.standard.mean) + said + (self.emotion_count if self.emotion_count > 1 else 0)
+        return EACH * len(self.standard.mean) + self.said_width + (self.emotion_count if self.emotion_count > 1 else 0)
 
-    def told(self, bands: Single, said: Said, times_s: Floats, spacing_s: float | None = None) -> Single:
+    @property
+    def said_width(self) -> int:
+        """How many of them, after what is heard, tell what is said."""
+        return len(PHONES) + 2 if self.phones else 0
+
+    def told(self, bands: NDArray[Any], said: Said, times_s: Floats, spacing_s: float | None = None) -> Single:
         """[F, W] at times [F]; spacing_s: between the frames of the bands, as long as EACH of them fill a frame unless given."""
         spacing_s = 1 / (EACH * self.rate) if spacing_s is None else spacing_s
         around = (np.arange(EACH) - (EACH - 1) / 2) * spacing_s

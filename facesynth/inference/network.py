@@ -75,7 +75,7 @@ class Network:
         stream is not sharpened, closes no lips, and adds no residual motion.
         """
         if not self.streams:
-            raise FacesynthError("this network hears whole utterances; for a stream train one with features=log_mel, phones=false")
+            raise FacesynthError("this network hears whole utterances; for a stream train with features=log_mel, phones=false")
         if self.expectation.reading.phones:
             raise FacesynthError("this network is told what is said and wants whole utterances; train one with phones=false")
         felt = (NEUTRAL if NEUTRAL in self.emotions else self.emotions[0]) if emotion is None else emotion

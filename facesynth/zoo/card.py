@@ -23,6 +23,8 @@ class Figure:
     value: float
     command: str
     """That measured it."""
+    found_by: str = ""
+    """Regular expression whose group finds the value in what the command prints; `benchmarks/cards.py` measures it again."""
 
 
 @dataclass(frozen=True)
@@ -77,19 +79,25 @@ def card_of(stated: Any) -> Card:
     if lacking := [name for name in ("title", "performer", "languages", "licence", "consent") if name not in stated]:
         raise FacesynthError(f"the card lacks {', '.join(lacking)}: say unknown where nobody knows it")
     try:
-        figures = tuple(Figure(str(one["what"]), float(one["value"]), str(one["command"])) for one in stated.get("figures") or ())
+        figures = tuple(map(_figure_of, stated.get("figures") or ()))
     except (TypeError, KeyError, ValueError) as error:
         raise FacesynthError(f"each figure of a card needs what, value and command ({error!r})") from None
     lists = {name: tuple(map(str, stated.get(name) or ())) for name in ("languages", "limits")}
     return Card(**{**stated, **lists, "figures": figures})
 
 
+def _figure_of(stated: Mapping[str, Any]) -> Figure:
+    return Figure(str(stated["what"]), float(stated["value"]), str(stated["command"]), str(stated.get("found_by", "")))
+
+
 def write_card(path: str | Path, card: Card) -> None:
     """Write it as YAML, in the order of its fields."""
     plain = {name: value for name, value in asdict(card).items() if value not in ("", ())}
-    for name in ("languages", "limits", "figures"):
+    for name in ("languages", "limits"):
         if name in plain:
             plain[name] = list(plain[name])
+    if card.figures:
+        plain["figures"] = [{name: value for name, value in figure.items() if value != ""} for figure in plain["figures"]]
     write_text(path, yaml.safe_dump(plain, sort_keys=False, allow_unicode=True, width=110))
 
 

@@ -6,7 +6,6 @@ captured nodes fit what is heard.
 
 from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,21 +36,23 @@ STEPS = 700
 LEARNING_RATE, WEIGHT_DECAY, WARMING = 2e-3, 1e-2, 0.1
 """The rate rises over this share of the steps and then falls along a cosine."""
 LARGEST_GRADIENT = 1.0
-OTHER_VOICES = 17
-"""Beside the seed: of the draws that change sounds."""
-Bands = NDArray[Any]
 AVERAGED, SETTLING = 0.99, 10
 """Weights are averaged over about a hundred steps, fewer at the start."""
+OTHER_VOICES = 17
+"""Beside the seed: of the draws that change sounds."""
+
+Bands = NDArray[Any]
 
 
 class PosePredictor(nn.Module):
     """From sound, phones and emotion to the pose that is to be expected, and how sure that is.
 
     features: what is heard, see `Hearing`. phones: whether the network is told what is said. look_ahead_s: how much of the
-    sound after a frame it may hear; None for as much as it hears before (0.7 s at 25 frames a second).
+    sound after a frame it may hear; None for as much as it hears before (0.7 s at 25 frames a second). voices: how many changed
+    sounds of each recording (see `other_voices`) it learns from as well, for voices, microphones and rooms that are not the
+    talker's. unsaid: the share of what it learns from of which it is not told what is said.
     """
 
-    heard_phones: dict = {}
     fps: Tensor
     """[1] rate of the motion that was learned, Hz."""
     emotion_count: Tensor
@@ -66,10 +67,16 @@ class PosePredictor(nn.Module):
     """[D] how much a squared difference of each coordinate counts."""
 
     def __init__(
-        self, features: Features = "log_mel", *, phones: bool = True, look_ahead_s: float | None = None, voices: int = 0
+        self,
+        features: Features = "log_mel",
+        *,
+        phones: bool = True,
+        look_ahead_s: float | None = None,
+        voices: int = 0,
+        unsaid: float = 0.0,
     ) -> None:
         super().__init__()
-        self.phones, self.look_ahead_s, self.voices = phones, look_ahead_s, voices
+        self.phones, self.look_ahead_s, self.voices, self.unsaid = phones, look_ahead_s, voices, unsaid
         self.hearing = Hearing(features, BANDS)
         self.pca = _no_components()
         self.network = PoseNetwork(1, 1)
@@ -103,7 +110,7 @@ class PosePredictor(nn.Module):
         self.into, self.onto = self.scale * self.pca.basis.T, self.pca.mean.clone()
         self.network = PoseNetwork(self.reading.width, self.pca.basis.shape[1], seed=seed).to(device)
         recordings = [self.recording(*one, corpus.emotions) for one in zip(corpus, heard, strict=True)]
-        return Windows(recordings, self.reading, self.ahead)
+        return Windows(recordings, self.reading, self.ahead, self.unsaid)
 
     def heard(self, corpus: Corpus, seed: int) -> list[list[Bands]]:
         """Features [F, B] of each recording, and of `voices` changed sounds of it."""
@@ -162,11 +169,8 @@ class PosePredictor(nn.Module):
         filled = np.where(present[:, None], frames, self.pca.mean.cpu().numpy())
         poses = self.pca.encode(torch.from_numpy(filled.astype(np.float32)).to(self.scale.device)) / self.scale
         said = Said.of(utterance.speech, emotions)
-        again = self.heard_phones.get(utterance.id)
-        heard_ = None if again is None else Said.of(replace(utterance.speech, phones=again), emotions)
-        return Recording(
-            heard[0], tuple(heard[1:]), said, heard_, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps
-        )
+        own, *others = heard
+        return Recording(own, tuple(others), said, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps)
 
 
 def _no_components() -> Pca:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import torch
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facesynth.inference.expectation import EACH, Reading, Said
-from facesynth.inference.phones import PHONES
 
 WINDOW, BATCH = 64, 16
 """Frames of a window, and windows of a step."""
@@ -41,7 +40,6 @@ class Recording:
     others: tuple[NDArray[np.float16], ...]
     """The same [F, B] as other people, microphones and rooms would have made it; see `other_voices`."""
     said: Said
-    heard: Said | None
     poses: Single
     """[T, R] components of the motion at its own rate; what is missing is 0."""
     present: Single
@@ -72,11 +70,9 @@ class Batch(NamedTuple):
 class Windows:
     """Draws batches of windows of recordings, longer ones more often."""
 
-    unsaid = unheard = 0.0
-    heard_share = 0.5
-
-    def __init__(self, recordings: Sequence[Recording], reading: Reading, ahead: int) -> None:
-        self.recordings, self.reading, self.ahead = recordings, reading, ahead
+    def __init__(self, recordings: Sequence[Recording], reading: Reading, ahead: int, unsaid: float = 0.0) -> None:
+        """unsaid: in this share of the windows the network is not told what is said, and must hear it."""
+        self.recordings, self.reading, self.ahead, self.unsaid = recordings, reading, ahead, unsaid
         lengths = np.array([recording.duration_s for recording in recordings])
         self.shares = lengths / lengths.sum()
 
@@ -92,22 +88,13 @@ class Windows:
         room = max(recording.duration_s * rate - WINDOW * tempo, 0) + OVERHANG
         start = rng.uniform(-OVERHANG, room)
         times_s = (start + tempo * np.arange(WINDOW + self.ahead, dtype=np.float64)) / rate
-        said = recording.said if recording.heard is None or rng.random() >= self.heard_share else recording.heard
-        told = self.reading.told(self._bands(recording, rng), said, times_s, tempo / (EACH * rate))
+        told = self.reading.told(_any_bands(recording, rng), recording.said, times_s, tempo / (EACH * rate))
         heard = EACH * len(self.reading.standard.mean)
         told[:, :heard] = self._disturbed(told[:, :heard], rng)
-        if rng.random() < self.unsaid and self.reading.phones:
-            told[:, heard : heard + len(PHONES) + 2] = 0
-        elif rng.random() < self.unheard:
-            told[:, :heard] = 0
+        if self.unsaid and rng.random() < self.unsaid:
+            told[:, heard : heard + self.reading.said_width] = 0
         poses, present = _at(recording, times_s[:WINDOW] * recording.fps)
         return told, poses, present
-
-    @staticmethod
-    def _bands(recording: Recording, rng: np.random.Generator) -> Single:
-        """Of its own sound or of one of the others, all of them alike."""
-        number = int(rng.integers(1 + len(recording.others))) if recording.others else 0
-        return recording.others[number - 1] if number else recording.bands
 
     def _disturbed(self, heard: Single, rng: np.random.Generator) -> Single:
         """Bands [F, EACH B] louder or softer, noisy, and some of them silent."""
@@ -143,6 +130,12 @@ def _mixed(batch: Batch, rng: np.random.Generator) -> Batch:
     share = torch.from_numpy(rng.uniform(0, MIXED, (len(batch.told), 1, 1)).astype(np.float32))
     told, poses = (part + share * (part.roll(1, 0) - part) for part in (batch.told, batch.poses))
     return Batch(told, poses, batch.present * batch.present.roll(1, 0))
+
+
+def _any_bands(recording: Recording, rng: np.random.Generator) -> NDArray[Any]:
+    """Of its own sound or of one of the others, all of them alike."""
+    number = int(rng.integers(1 + len(recording.others))) if recording.others else 0
+    return recording.others[number - 1] if number else recording.bands
 
 
 def _at(recording: Recording, at: NDArray[np.float64]) -> tuple[Single, Single]:

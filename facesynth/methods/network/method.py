@@ -36,6 +36,10 @@ class Network(Method):
         (0.7 s at 25 frames a second), which is also what a negative one stands for.
     features : str
         What is heard: `log_mel`, `phone_net` or `both`.
+    voices : int
+        How many changed sounds of each recording are learned from as well: other vocal tracts, microphones, rooms, levels.
+    unsaid : float
+        The share of what is learned from in which the network is not told what is said, and must hear it; 0..1.
     sharpening : float
         How much quick movement is raised: the pose in the middle of the likely ones moves too little.
     close_lips : bool
@@ -50,6 +54,8 @@ class Network(Method):
         phones: bool = True,
         look_ahead_s: float = -1.0,
         features: Features = "log_mel",
+        voices: int = 0,
+        unsaid: float = 0.0,
         sharpening: float = 0.0,
         close_lips: bool = False,
         residual: float = 0.0,
@@ -64,8 +70,10 @@ class Network(Method):
                 "network needs at least one step of training, sharpening and residual of 0 or more and a finite look-ahead; "
                 f"got {steps}, {sharpening}, {residual} and {look_ahead_s}"
             )
+        if voices < 0 or not 0 <= unsaid <= 1:
+            raise FacesynthError(f"network needs 0 voices or more and a share unsaid of 0 to 1; got {voices} and {unsaid}")
         ahead = None if look_ahead_s < 0 else look_ahead_s
-        self.predictor = PosePredictor(features, phones=phones, look_ahead_s=ahead)
+        self.predictor = PosePredictor(features, phones=phones, look_ahead_s=ahead, voices=voices, unsaid=unsaid)
         self.residual = Residual() if residual > 0 else None
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
@@ -94,6 +102,7 @@ class Network(Method):
             sharpening=self.config["sharpening"],
             closed_gap=np.inf if gap is None else gap,
             residual=self.residual.motion(self.fps, self.config["residual"]) if self.residual else None,
+            streams=self.config["features"] == "log_mel",
         )
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
