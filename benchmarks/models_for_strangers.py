@@ -1,14 +1,17 @@
-"""Models by name, driven by a voice that none of them learned from: python benchmarks/models_for_strangers.py STRANGER/ [MODEL …]
+"""Models by name, driven by a voice that none of them learned from.
+
+python benchmarks/models_for_strangers.py STRANGER/ [MODEL …] [--tracked FOLDER]
 
 STRANGER is a corpus of somebody else, such as GRID s26 from video; MODEL a name or a file, all that `facesynth models` lists
 where none is given. Openings of the lips against the stranger's own: mean correlation over the clips with the words known (phones
 placed by a transcript) and with nothing known (phones heard in the sound), over whole clips, with the rest before and after, and
 from the first to the last phone; then, with the words known and in speech, the share of clips whose openings have 0.85 to 1.15 of
 the stranger's standard deviation after one gain for all, and the share of p, b and m at which the lips shut. `loudness` is the
-logarithm of the sound's level, smoothed as a jaw moves: what anybody has without a model.
+logarithm of the sound's level, smoothed as a jaw moves: what anybody has without a model. FOLDER has the same clips as another
+program followed them (`CLIP_mediapipe.npz`, 478 landmarks as shares of a picture of 360 x 288): how far two trackers agree.
 """
 
-import sys
+import argparse
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
@@ -32,6 +35,8 @@ COLUMNS = ("whole clip, words known", "nothing known", "in speech, words known",
 ALIKE = 0.15
 LEVEL_S = 0.05
 """Standard deviation of the smoothing of the sound's level."""
+LIP_PAIRS = ((82, 87), (13, 14), (312, 317))
+"""Landmarks of the inner lips, upper and lower, by their numbers in MediaPipe's mesh of a face."""
 Opening = Callable[[Speech], tuple[NDArray[np.float64], float]]
 """Of the lips [T], in any unit, and its rate, Hz."""
 
@@ -51,7 +56,7 @@ class Row:
         return " | ".join(f"{figure:.2f}" for figure in astuple(self))
 
 
-def main(stranger: Path, models: list[str]) -> None:
+def main(stranger: Path, models: list[str], tracked: Path | None) -> None:
     corpus = Corpus.open(stranger)
     said = [corpus[name] for name in corpus.ids]
     heard = [replace(u, speech=unknown(u.speech)) for u in said]
@@ -62,6 +67,10 @@ def main(stranger: Path, models: list[str]) -> None:
     for name in models or [name for name in names() if entry(name).part == "mouth"]:
         print(f"| {name} | {judged(opening_of(name), said, heard, truth, share)} |", flush=True)
     print(f"| loudness | {judged(loudness, said, heard, truth, share)} |")
+    if tracked is not None:
+        others = [tracked_lips(tracked / f"{u.id}_mediapipe.npz", u) for u in said]
+        inside = correlation(cut(others, said), cut(truth, said))
+        print(f"| the same lips by another tracker | {correlation(others, truth):.2f} | | {inside:.2f} | | | |")
 
 
 def unknown(speech: Speech) -> Speech:
@@ -86,6 +95,15 @@ def loudness(speech: Speech) -> tuple[NDArray[np.float64], float]:
     pieces = np.array_split(speech.audio.astype(np.float64), max(1, round(len(speech.audio) / speech.sample_rate * fps)))
     level = np.log10(np.array([np.sqrt(np.mean(piece**2)) for piece in pieces]) + 1e-3)
     return gaussian(level[:, None], LEVEL_S * fps)[:, 0], fps
+
+
+def tracked_lips(path: Path, utterance: Utterance) -> Motion:
+    """The lips of a clip as another program followed them, in heights of the picture, as long as the clip."""
+    with np.load(path) as kept:
+        height = kept["landmarks"][:, :, 1]
+    opening = np.mean([height[:, below] - height[:, above] for above, below in LIP_PAIRS], axis=0)
+    at = np.minimum(np.arange(len(utterance.motion)), len(opening) - 1)
+    return lips_of(opening[at], utterance.motion.fps)
 
 
 def judged(opening: Opening, said: list[Utterance], heard: list[Utterance], truth: list[Motion], share: float) -> Row:
@@ -135,4 +153,9 @@ def closed(made: Motion, utterance: Utterance, below: float) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("stranger", type=Path)
+    parser.add_argument("models", nargs="*")
+    parser.add_argument("--tracked", type=Path, metavar="FOLDER")
+    options = parser.parse_args()
+    main(options.stranger, options.models, options.tracked)
