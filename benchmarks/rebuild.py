@@ -33,7 +33,8 @@ def main() -> int:
     asked = [word for word in options.words if "=" not in word]
     folders = [path.parent for path in sorted(PACKAGED.glob(f"*/{CARD}")) if not asked or path.parent.name in asked]
     with tempfile.TemporaryDirectory() as empty:
-        return int(not all([same(folder, places, options.keep or Path(empty)) for folder in folders]))
+        differ = [folder for folder in folders if not same(folder, places, options.keep or Path(empty))]
+        return int(bool(differ))
 
 
 def same(folder: Path, places: Mapping[str, str], place: Path) -> bool:
