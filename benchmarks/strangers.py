@@ -2,8 +2,8 @@
 
 Each row learns from four fifths of CORPUS, drawn by seed 0, and says clips of the last fifth of it and all of STRANGERS, a corpus
 of somebody else in the same layout. Printed are the lip error on the talker's own unseen clips (`lve`, unit of the layout), and
-for strangers the mean correlation over clips of the lip opening with that of the speaker's own lips, from the first to the last phone
-and over whole clips, with the words known and with phones heard in the sound. `--device` says where networks are trained.
+for strangers the mean correlation over clips of the lip opening with that of the speaker's own lips, from the first to the last
+phone and over whole clips, with the words known and with phones heard in the sound. `--device` says where networks are trained.
 """
 
 import argparse
