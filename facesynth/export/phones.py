@@ -36,7 +36,7 @@ def phone_net_graph() -> Graph:
     def reference(arrays: Arrays) -> list[NDArray[Any]]:
         return [network.part(**arrays)[1][:, :, HIDDEN_LAYER]]
 
-    about = "what the third Conformer block of a network that hears phones makes of the sound"
+    about = "what the second Conformer block of a network that hears phones makes of the sound"
     return Graph("phone_net", about, hidden_graph(weights, HIDDEN_LAYER).model(), (sound,), (hidden,), _sound, reference)
 
 
