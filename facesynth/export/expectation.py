@@ -47,7 +47,7 @@ def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
 def hearing_graphs(hearing: Hearing) -> tuple[Graph, ...]:
     """What it hears with."""
     log_mel = () if hearing.features == "phone_net" else (log_mel_graph(hearing.mel),)
-    return log_mel + (() if hearing.features == "log_mel" else (phone_net_graph(),))
+    return log_mel + (() if hearing.features == "log_mel" else (phone_net_graph(int(hearing.layer)),))
 
 
 def _changed(b: Builder, value: str, block: CausalBlock) -> str:

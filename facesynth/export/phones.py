@@ -10,7 +10,6 @@ from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.graph import Arrays, Graph, Port
 from facesynth.export.weights import Weights, stored_as
 from facesynth.inference.ear import FRAMES_PER_S, RATE, STEP, WHOLE
-from facesynth.inference.heard import HIDDEN_LAYER
 from facesynth.speech.phone_archive import NOTICE, read_archive
 from facesynth.speech.phone_graph import OUTPUTS, alphabet_of, hidden_graph, phone_graph
 from facesynth.speech.phone_network import phone_network
@@ -27,17 +26,17 @@ def export_phones(folder: str | Path, weights: Weights = "float32") -> dict[str,
     return write_folder(folder, Subject("phones", data, None, None, ()), stored_as(content, weights))
 
 
-def phone_net_graph() -> Graph:
-    """The network up to the layer that others hear with."""
+def phone_net_graph(layer: int) -> Graph:
+    """The network up to a layer, from 0, that others hear with."""
     network, weights = phone_network(), network_weights(read_archive())
     sound = Port("audio", "float32", ("batch", "samples"), "full scale 1", RATE)
     hidden = Port(OUTPUTS[1], "float32", ("batch", "frames", WIDTH), "none", FRAMES_PER_S)
 
     def reference(arrays: Arrays) -> list[NDArray[Any]]:
-        return [network.part(**arrays)[1][:, :, HIDDEN_LAYER]]
+        return [network.part(**arrays)[1][:, :, layer]]
 
-    about = "what the second Conformer block of a network that hears phones makes of the sound"
-    return Graph("phone_net", about, hidden_graph(weights, HIDDEN_LAYER).model(), (sound,), (hidden,), _sound, reference)
+    about = f"what the Conformer block {layer + 1} of a network that hears phones makes of the sound"
+    return Graph("phone_net", about, hidden_graph(weights, layer).model(), (sound,), (hidden,), _sound, reference)
 
 
 def phone_network_graph() -> Graph:

@@ -11,16 +11,12 @@ from .graphs import Graph, Part
 
 HOP = STEP // 2
 """Samples between frames of either."""
-HIDDEN_LAYER = 1
-"""The second block's output: of the four, and of pairs of them, a network that learned from it follows strangers' lips best and
-the talker's own no worse than from the third, which a regression tells visemes from best."""
-
 Single = NDArray[np.float32]
 Hear = Callable[[Single], Single]
 """From sound [S] at 16 kHz to features [1 + S // HOP, W], a frame every 10 ms."""
 
 
-def hidden_layer(network: Part, audio: ArrayLike, layer: int = HIDDEN_LAYER) -> Single:
+def hidden_layer(network: Part, audio: ArrayLike, layer: int) -> Single:
     """[1 + S // HOP, W] what a block of the phone network makes of a sound [S]: linear between its frames of 20 ms."""
     sound = np.asarray(audio, np.float32)
     _, hidden = Ear(network).hear(sound)

@@ -7,7 +7,7 @@ from corpora import tiny_corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.baselines.ridge import Ridge
 from facesynth.methods.baselines.tcn import Tcn
-from facesynth.methods.learn.hearing import WIDTHS, Hearing
+from facesynth.methods.learn.hearing import HIDDEN_LAYER, WIDTHS, Hearing
 from facesynth.speech.phone_archive import is_installed
 
 needs_weights = pytest.mark.skipif(not is_installed(), reason="the weights that phones are heard with are not installed")
@@ -45,6 +45,18 @@ def test_a_model_keeps_what_it_hears_with(corpus, tmp_path):
     model.save(tmp_path / "m.safetensors")
     again = Tcn.load(tmp_path / "m.safetensors")
     np.testing.assert_array_equal(again.synthesize(speech).frames, model.synthesize(speech).frames)
+
+
+@needs_weights
+def test_a_model_hears_with_the_layer_that_it_learned_with(corpus, tmp_path):
+    model = Ridge(features="phone_net").fit(corpus, seed=0)
+    speech = next(iter(corpus)).speech
+    model.save(tmp_path / "m.safetensors")
+    assert int(Ridge.load(tmp_path / "m.safetensors").hearing.layer) == HIDDEN_LAYER
+    model.hearing.layer -= 1
+    model.save(tmp_path / "other.safetensors")
+    other = Ridge.load(tmp_path / "other.safetensors")
+    assert not np.array_equal(other.hearing.bands(speech), Ridge.load(tmp_path / "m.safetensors").hearing.bands(speech))
 
 
 def test_unknown_features_are_refused():

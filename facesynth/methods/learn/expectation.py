@@ -102,6 +102,7 @@ class PosePredictor(nn.Module):
         device = self.scale.device
         self.fps = torch.full_like(self.fps, corpus.fps)
         self.emotion_count = torch.full_like(self.emotion_count, len(corpus.emotions))
+        self.hearing.begin()
         heard = self.heard(corpus, seed)
         self.hearing.standardise(bands for each in heard for bands in each)
         frames = complete_frames(corpus)

@@ -21,6 +21,11 @@ from facesynth.speech.phone_weights import WIDTH
 Features = Literal["log_mel", "phone_net", "both"]
 BANDS = 40
 """Log-mel bands, unless told otherwise."""
+HIDDEN_LAYER = 1
+"""The second block's output: of the four, and of pairs of them, a network that learned from it follows strangers' lips best and
+the talker's own no worse than from the third, which a regression tells visemes from best."""
+EARLIER_LAYER = 2
+"""What models heard with whose files do not say the layer."""
 WIDTHS = {"log_mel": BANDS, "phone_net": WIDTH, "both": BANDS + WIDTH}
 
 
@@ -35,6 +40,8 @@ class Hearing(nn.Module):
     """[W]"""
     deviation: Tensor
     """[W]"""
+    layer: Tensor
+    """[1] of the phone network, from 0, where that is heard."""
 
     def __init__(self, features: Features = "log_mel", bands: int = BANDS) -> None:
         super().__init__()
@@ -45,9 +52,17 @@ class Hearing(nn.Module):
         self.mel = LogMel(bands=bands)
         self.register_buffer("mean", torch.zeros(self.width))
         self.register_buffer("deviation", torch.ones(self.width))
+        if features != "log_mel":
+            self.register_buffer("layer", torch.tensor([EARLIER_LAYER]))
+
+    def begin(self) -> None:
+        """Hear from now on as models that are learned today do."""
+        if self.features != "log_mel":
+            self.layer = torch.full_like(self.layer, HIDDEN_LAYER)
 
     def learn(self, corpus: Corpus) -> None:
         """Take mean and deviation of each feature from all sounds of a corpus."""
+        self.begin()
         self.standardise(self.bands(utterance.speech) for utterance in corpus)
 
     def standardise(self, heard: Iterable[NDArray[Any]]) -> None:
@@ -76,6 +91,9 @@ class Hearing(nn.Module):
     def of_sound(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same of sound [S] at 16 kHz."""
         if self.features == "phone_net":
-            return hidden_layer(phone_network().part, audio)
+            return self._hidden(audio)
         heard: NDArray[Any] = self.mel(torch.from_numpy(audio).to(self.mel.window.device)).cpu().numpy()
-        return heard if self.features == "log_mel" else np.hstack([heard, hidden_layer(phone_network().part, audio)])
+        return heard if self.features == "log_mel" else np.hstack([heard, self._hidden(audio)])
+
+    def _hidden(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
+        return hidden_layer(phone_network().part, audio, int(self.layer))
