@@ -19,10 +19,12 @@ from facesynth.studio.performing import Performing
 from facesynth.studio.project import Kept
 from facesynth.studio.studio import Studio
 
-NEAR_S = 1.0
+NEAR_S = 0.5
 """Before and after the playhead, what is made first."""
 DRAGGED_S = 0.15
 """The same while something is dragged: the face at the playhead follows, the rest when the pointer rests."""
+RESTS_S = 0.08
+"""So long nothing new was asked for when the pointer rests."""
 LONGEST_S = 1e6
 """Further than that no line goes, whatever a page says."""
 BATCH_S = 4
@@ -143,16 +145,26 @@ class SocketWindow:
             at_s = min(wanted.at_s, now.speech.duration_s)
             shown = await studio.away(performing.stretch, now, max(at_s - DRAGGED_S, 0.0), at_s + DRAGGED_S)
             await self._send(face_message(shown, last=False, **about))
+            if await self._overtaken():
+                return
         batches = [batch for batch in order if any(performing.stale(pieces.get(k, 0), k, k + 1) for k in batch)] or order[:1]
         generation = performing.generation
         for number, batch in enumerate(batches, start=1):
-            if self._wanted is not None and (number > 1 or wanted.trial is not None):
+            if self._wanted is not None and number > 1:
                 return
             shown = await studio.away(performing.stretch, now, float(batch.start), float(batch.stop))
             await self._send(face_message(shown, last=number == len(batches), **about))
             pieces |= dict.fromkeys(batch, generation)
         if wanted.trial is None and self._wanted is None:
             await self.tell({"kind": "choices", **about, "rows": await studio.away(now.draft.choices)})
+
+    async def _overtaken(self) -> bool:
+        """Whether something newer is wanted before the pointer rests."""
+        try:
+            await asyncio.wait_for(self._news.wait(), RESTS_S)
+        except TimeoutError:
+            return False
+        return True
 
     async def _op_change(self, message: dict[str, Any]) -> dict[str, Any]:
         if self._shown is not None and "at" in message:
