@@ -6,7 +6,7 @@ their neighbours along and weak ones (`hh`, `k`) take the shape of what surround
 lips that close for p, b, m do close, and are carried as tracks of their own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,20 @@ PAUSE_S = 0.22
 """The mouth shuts in silences that last at least this long."""
 FLOOR = 1e-6
 """Dominance of the rest pose where nothing else is claimed."""
-SMOOTH_S = {"jaw": 0.016, "lips": 0.011, "tongue": 0.009}
+FADE: Mapping[str, float] = {
+    "long": 0.127,
+    "loud": 0.727,
+    "held": 0.076,
+    "before_s": 0.0388,
+    "before": 0.141,
+    "after_s": 0.0327,
+    "after": 0.0691,
+    "smooth_s": 0.0228,
+}
+"""How openings rise and fade, calibrated on a recorded talker by train/performer_targets.py: exponents of a vowel's length and
+loudness; the share of a phone to either side of its middle over which it is felt in full; time constants before and after it,
+and what each second of it adds to them; inertia of the jaw."""
+SMOOTH_S = {"jaw": FADE["smooth_s"], "lips": 0.7 * FADE["smooth_s"], "tongue": 0.009}
 """Inertia of the articulators: standard deviation of the Gaussian that smooths them."""
 TIGHTEST_MM, LOOSEST_MM = -0.4, 0.3
 """Inner-lip gap at a closure: lips are pressed together more or less, from token to token."""
@@ -94,7 +107,7 @@ def articulate(
     for who, sigma in (("jaw", SMOOTH_S["jaw"]), ("tongue", SMOOTH_S["tongue"]), ("", SMOOTH_S["lips"])):
         columns = [i for i, name in enumerate(CURVES) if _inertia(name) == who]
         curves[:, columns] = gaussian_filter1d(curves[:, columns], sigma * fps, axis=0, mode="nearest")
-    closure, gap, tuck = _contacts(gestures, times)
+    closure, gap, tuck = contacts(gestures, times)
     curves = curves * np.broadcast_to(effort, count)[:, None]
     return Articulation(_with_contacts(curves, closure, tuck), closure, gap, tuck)
 
@@ -125,7 +138,7 @@ def _as_meant(gesture: Gesture, times: NDArray[np.float64], loudness: NDArray[np
     if gesture.target.phone in VOWELS:
         reached = _reached(gesture, times, loudness)
         pose[JAW] *= reached
-        pose[OPENING] *= 0.6 + 0.4 * reached
+        pose[OPENING] *= reached
     if gesture.target.closes == "rest" and gesture.closes == "":
         pose[JAW] = 0.03  # a short pause stays a little open
     target = replace(gesture.target, pose=pose)
@@ -134,17 +147,21 @@ def _as_meant(gesture: Gesture, times: NDArray[np.float64], loudness: NDArray[np
 
 def _reached(gesture: Gesture, times: NDArray[np.float64], loudness: NDArray[np.float64]) -> float:
     """Share of a vowel's opening that is reached: less where it is short or weak, more where it is long and loud."""
+    long = float(np.clip((gesture.duration_s / FULL_VOWEL_S) ** FADE["long"], 0.4, 1.25))
+    return long * heard_loudness(gesture, times, loudness) ** FADE["loud"]
+
+
+def heard_loudness(gesture: Gesture, times: NDArray[np.float64], loudness: NDArray[np.float64]) -> float:
+    """How loud the loudest part of a gesture is, 0.3..1.4; loudness: [T] at times [T] (s)."""
     heard = loudness[(times >= gesture.start_s) & (times <= gesture.end_s)]
-    loud = float(np.clip(heard.max(initial=0.3), 0.3, 1.4))
-    long = float(np.clip((gesture.duration_s / FULL_VOWEL_S) ** 0.45, 0.5, 1.15))
-    return long * loud**0.3
+    return float(np.clip(heard.max(initial=0.3), 0.3, 1.4))
 
 
 def _blend(gestures: Sequence[Gesture], times: NDArray[np.float64]) -> NDArray[np.float64]:
     """[T, 14] targets weighted by dominance (Cohen and Massaro 1993, equations 1-3).
 
     `D_p(t) = alpha_p exp(-(theta_p |tau|)^c)` with tau the time from the gesture, and
-    `F(t) = sum_p D_p(t) T_p / sum_p D_p(t)`. Here tau is 0 over the middle 60 % of the phone, c = 1.25, and 1/theta grows
+    `F(t) = sum_p D_p(t) T_p / sum_p D_p(t)`. Here tau is 0 over the middle of the phone, c = 1.25, and 1/theta grows
     with the phone's duration: fast speech reaches less far, and so do its targets. It is larger before the phone than after
     it, since speakers prepare more than they linger.
     """
@@ -160,14 +177,14 @@ def _blend(gestures: Sequence[Gesture], times: NDArray[np.float64]) -> NDArray[n
 
 def _felt(gesture: Gesture, times: NDArray[np.float64]) -> NDArray[np.float64]:
     centre, duration = (gesture.start_s + gesture.end_s) / 2, gesture.duration_s
-    away = np.maximum(np.abs(times - centre) - 0.30 * duration, 0.0)
-    before = gesture.target.early * (0.030 + 0.20 * min(duration, 0.16))
-    after = gesture.target.late * (0.026 + 0.16 * min(duration, 0.16))
+    away = np.maximum(np.abs(times - centre) - FADE["held"] * duration, 0.0)
+    before = gesture.target.early * (FADE["before_s"] + FADE["before"] * min(duration, 0.16))
+    after = gesture.target.late * (FADE["after_s"] + FADE["after"] * min(duration, 0.16))
     felt: NDArray[np.float64] = np.exp(-((away / np.where(times < centre, before, after)) ** 1.25))
     return felt
 
 
-def _contacts(
+def contacts(
     gestures: Sequence[Gesture], times: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Closure [T], the gap it aims at [T] and tuck [T]: contacts are held, whatever the neighbours want."""

@@ -130,7 +130,7 @@ def _blinks(feelings: Feelings, count: int, fps: float, rng: np.random.Generator
     return closed * closed * (3 - 2 * closed)
 
 
-TUCK_GAP_MM = 2.4
+TUCK_GAP_MM = 1.8
 """Inner-lip gap where the lower lip is at the upper teeth."""
 TIGHTEST_GAP_MM = -1.2
 """Beyond this the lips would pass through each other: the jaw gives way."""

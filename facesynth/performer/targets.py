@@ -89,7 +89,11 @@ class Target:
 @cache
 def load_targets() -> Mapping[str, Target]:
     """Rows of the table by phone."""
-    text = files("facesynth.performer").joinpath("targets.csv").read_text(encoding="utf-8")
+    return read_targets(files("facesynth.performer").joinpath("targets.csv").read_text(encoding="utf-8"))
+
+
+def read_targets(text: str) -> dict[str, Target]:
+    """Rows of a table, the text of a CSV, by phone."""
     return {row["phone"]: _target(row) for row in csv.DictReader(text.splitlines())}
 
 

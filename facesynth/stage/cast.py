@@ -14,6 +14,7 @@ from facesynth.methods.registry import able, ask, load_trained, read_option, req
 from facesynth.methods.trained import TrainedModel
 from facesynth.stage.expressed import expressed
 from facesynth.stage.request import AUTO, Part, Request
+from facesynth.zoo.shelf import load
 
 if TYPE_CHECKING:
     from facesynth.methods.emotion.detector import EmotionDetector
@@ -101,7 +102,7 @@ def _mover(part: str, asked: Part) -> TrainedModel | None:
     """The model that moves a part, where one was asked for."""
     if asked.model is None:
         return None
-    mover = load_trained(asked.model)
+    mover = load(asked.model)
     if mover.capabilities.part != part:
         raise FacesynthError(f"{asked.model} moves the {mover.capabilities.part}; --{part} wants a model of the {part}")
     if asked.method not in ("", mover.name, mover.name.removeprefix(f"{part}_")):

@@ -80,7 +80,7 @@ def test_emotions_change_within_an_utterance(lips):
     emotions = EmotionTrack(("happy", "angry"), np.array([half, calm.duration_s]), np.ones(2))
     performance = act(Speech(calm.audio, calm.sample_rate, calm.phones, emotions), lips)
     middle, edge = round(half * 120), 40
-    anger, cheeks = weight(performance, "noseSneerLeft"), weight(performance, "cheekSquintLeft")
+    anger, cheeks = weight(performance, "browDownLeft"), weight(performance, "cheekSquintLeft")
     assert anger[: middle - edge].max() < 0.1
     assert anger[middle + edge :].mean() > 0.4
     assert cheeks[edge : middle - edge].mean() > 2 * cheeks[middle + edge :].mean()
