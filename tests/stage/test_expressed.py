@@ -13,7 +13,10 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.planar import tracked_layout
+from facesynth.stage.cast import cast_for
 from facesynth.stage.expressed import expressed
+from facesynth.stage.request import Request
+from facesynth.zoo.shelf import load
 
 FELT = ("browInnerUp", "mouthFrownLeft", "jawOpen")
 RESTING, SAD = np.array([0.1, 0.0, 0.2]), np.array([0.6, 0.4, 0.5])
@@ -91,3 +94,12 @@ def test_real_faces_in_video_and_curves_of_ones_own_are_refused():
         expressed(Feeling(), Motion(still, 25.0, tracked_layout(478)), feels(1.0))
     with pytest.raises(FacesynthError, match="this mouth moves other curves"):
         expressed(Feeling(), Motion(still[:, :2], 25.0, Layout("curves", ("a", "b"))), feels(1.0))
+
+
+def test_the_expressions_of_the_package_are_found_by_name_and_felt_by_a_real_talkers_mouth():
+    request = Request(expression="expressions", emotion="sad")
+    sad, calm = (cast_for(load("grid-s1"), request).motion(feels(amount), request, {}) for amount in (1.0, 0.0))
+    assert (calm.layout.kind, sad.layout.names) == ("markers", ARKIT_NAMES)
+    assert column(sad, "browInnerUp").mean() > 0.2
+    with pytest.raises(FacesynthError, match="unknown model"):
+        cast_for(load("grid-s1"), Request(expression="expresions", emotion="sad"))

@@ -175,7 +175,7 @@ def test_what_is_listed_is_what_speaks(capsys, monkeypatch):
     run(models, ["--json"])
     listed = json.loads(capsys.readouterr().out)
     assert DEFAULT in [one["name"] for one in listed]
-    assert {one["part"] for one in listed} >= {"mouth", "head", "eyes"}
+    assert {one["part"] for one in listed} >= {"mouth", "head", "eyes", "expression"}
 
 
 def test_the_doctor_names_what_is_missing(own_cache):
