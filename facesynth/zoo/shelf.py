@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from facesynth.methods.trained import TrainedModel
 
 PACKAGED = Path(__file__).with_name("models")
-DEFAULT = "grid-s1"
+DEFAULT = "grid-s1-network"
 """The mouth of those who name no model."""
 SUFFIX = ".safetensors"
 """Of a model's own file."""
