@@ -152,7 +152,7 @@ class Fit(torch.nn.Module):
             for first, last in pairwise([*range(0, len(order), BATCH), len(order)]):
                 loss = torch.stack([self.loss(clips[k]) for k in order[first:last]]).mean() + self.drawn()
                 optimiser.zero_grad()
-                loss.backward()
+                loss.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
                 optimiser.step()
 
     def loss(self, clip: Clip) -> Tensor:
