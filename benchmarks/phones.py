@@ -4,6 +4,8 @@ FOLDER holds any of `grid_s1`, `ravdess_speech` (words known: the reference is t
 labelled by hand). Phone error is Levenshtein distance over phones of the reference, viseme error the same over viseme classes
 with repeats merged; closures are p, b, m whose middles lie within 60 ms of each other, one to one: recall / precision, and how
 many that were heard meet none (false). The real-time factor is processor time over the sound's length, on one thread.
+Of the phones that people placed by hand it tells which a mark at each confidence would catch: a heard phone is right where one of the
+same label lies over its middle.
 """
 
 import argparse
@@ -11,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
+from itertools import cycle, groupby
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,11 +21,13 @@ import numpy as np
 import torch
 from alignment import STATEMENTS, edits, spoken
 from scipy.io import loadmat
+from scipy.linalg import solve_toeplitz
 from scipy.optimize import linear_sum_assignment
+from scipy.signal import lfilter
 from torchaudio.functional import bandpass_biquad, phase_vocoder
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.phones import BILABIALS, viseme_of
+from facesynth.inference.phones import BILABIALS, SILENCE, viseme_of
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.alignment import align
 from facesynth.speech.audio import load_audio, resample
@@ -33,7 +37,9 @@ from facesynth.speech.recognition import recognise
 from facesynth.speech.segments import phone_track, segments_of
 
 NEAR_S = 0.06
+SLACK_S = 0.03
 RATE = 16000
+TEN_MINUTES_S = 600
 T = TypeVar("T")
 Hear = Callable[[np.ndarray, int], PhoneTrack]
 
@@ -101,10 +107,35 @@ def main() -> None:
     }
     for name, clips in sets.items():
         report(name, clips, ways)
+    report_marks(sets["haskins_ema"])
     few = [clip for name in ("grid_s1", "ravdess_speech") for clip in evenly(sets[name], options.few)]
     report("streams", few, {f"look-ahead {ahead_s} s": partial(streamed, ahead_s=ahead_s) for ahead_s in (0.1, 0.2, 0.4, 0.8)})
     for condition, change in conditions(few).items():
         report(condition, list(map(change, few)), {"network": ways["network"]})
+    report("ten minutes in one", [strung(few, TEN_MINUTES_S)], {"network": ways["network"]})
+    for name, audio in WITHOUT_SPEECH.items():
+        print(f"\n{name}: {told(audio)}", flush=True)
+
+
+def report_marks(clips: list[Clip]) -> None:
+    """How many of the wrong phones a mark under each confidence catches, how many of the right ones it marks too."""
+    heard = [(sure, right) for clip in clips for sure, right in judged(clip)]
+    sure, right = np.array([s for s, _ in heard]), np.array([r for _, r in heard], bool)
+    print(f"\nmarked where less sure, of {(~right).sum()} wrong and {right.sum()} right phones with hand labels")
+    for level in (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98):
+        caught, alarms = (sure[~right] < level).mean(), (sure[right] < level).mean()
+        print(f"  {level:.2f}  wrong {caught:.2f}  right {alarms:.2f}  difference {caught - alarms:.2f}")
+
+
+def judged(clip: Clip) -> Iterator[tuple[float, bool]]:
+    """Confidence of each phone that is heard, and whether the same phone was placed over its middle by hand."""
+    heard = recognise(clip.audio, clip.rate)
+    said = segments_of(clip.truth)
+    for (label, start_s, end_s), sure in zip(segments_of(heard), heard.confidences, strict=True):
+        if label != SILENCE:
+            middle_s = (start_s + end_s) / 2
+            over = {one for one, begins_s, ends_s in said if begins_s - SLACK_S <= middle_s <= ends_s + SLACK_S}
+            yield float(sure), label in over
 
 
 def report(name: str, clips: list[Clip], ways: dict[str, Hear]) -> None:
@@ -181,7 +212,70 @@ def conditions(clips: list[Clip]) -> dict[str, Callable[[Clip], Clip]]:
         "a quarter faster": partial(paced, factor=1.25),
         "a quarter slower": partial(paced, factor=0.8),
         "pitch and formants a quarter higher": lambda clip: moved(paced(clip, 0.8), 1.25),
+        "whispered": whispered,
     }
+
+
+def whispered(clip: Clip) -> Clip:
+    """The vocal tract of the voice (linear prediction of 25 ms, order 18, at 16 kHz), driven by noise in place of the vocal folds."""
+    audio = resample(clip.audio, clip.rate, RATE)
+    window, hop, rng = np.hanning(400), 200, np.random.default_rng(0)
+    out = np.zeros(len(audio) + 400)
+    for start in range(0, len(audio) - 400, hop):
+        piece = audio[start : start + 400] * window
+        r = np.correlate(piece, piece, "full")[399:418]
+        if r[0] < 1e-8:
+            continue
+        r[0] *= 1.0001
+        a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])])
+        breath = lfilter([1.0], a, rng.standard_normal(800))[400:] * window
+        out[start : start + 400] += breath * np.sqrt(np.sum(piece**2) / np.sum(breath**2))
+    return Clip(out[: len(audio)].astype(np.float32), RATE, clip.truth)
+
+
+def strung(clips: list[Clip], least_s: float) -> Clip:
+    """Clips one after the other, again and again, until they last so long."""
+    sounds, said, now_s = [], [], 0.0
+    for clip in cycle(clips):
+        sounds.append(resample(clip.audio, clip.rate, RATE))
+        said += [(label, now_s + a, now_s + min(b, len(sounds[-1]) / RATE)) for label, a, b in segments_of(clip.truth)]
+        now_s += len(sounds[-1]) / RATE
+        if now_s >= least_s:
+            return Clip(np.concatenate(sounds), RATE, phone_track(said, now_s))
+
+
+def told(audio: np.ndarray) -> str:
+    """What is said of a sound in which nobody speaks."""
+    try:
+        heard = recognise(audio, RATE, fit=False)
+    except FacesynthError as error:
+        return str(error)
+    sure = np.array([s for label, s in zip(heard.labels, heard.confidences, strict=True) if label != SILENCE])
+    return f"{len(sure)} phones in {len(audio) / RATE:.0f} s, mean confidence {sure.mean():.2f}, {len(closures(heard))} closures"
+
+
+def music(seconds: float, drums: bool) -> np.ndarray:
+    """A tune of plucked strings over chords, with or without drums."""
+    rng, t = np.random.default_rng(0), np.arange(round(0.25 * RATE)) / RATE
+    notes = 220 * 2 ** (np.array([0, 3, 7, 10, 12, 10, 7, 3]) / 12)
+    bars = []
+    for beat in range(round(seconds / 0.25)):
+        tones = [notes[beat % 8], 110.0, 110 * 2 ** (7 / 12)]
+        sound = sum(np.sin(2 * np.pi * f * k * t) * np.exp(-3 * k * t) / k for f in tones for k in range(1, 9))
+        bars.append(sound + drums * (beat % 2 == 0) * 2 * rng.standard_normal(len(t)) * np.exp(-40 * t))
+    whole = np.concatenate(bars)
+    return (0.3 * whole / np.abs(whole).max()).astype(np.float32)
+
+
+NOISE = np.random.default_rng(1).standard_normal(10 * RATE).astype(np.float32)
+WITHOUT_SPEECH = {
+    "music, strings alone": music(20, drums=False),
+    "music with drums": music(20, drums=True),
+    "noise at -30 dB": 0.0316 * NOISE,
+    "noise at -70 dB": 0.000316 * NOISE,
+    "digital silence": np.zeros(10 * RATE, np.float32),
+}
+"""Sounds in which nobody speaks."""
 
 
 def paced(clip: Clip, factor: float) -> Clip:

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FacesynthError
 from .layout import Layout
+from .long_arrays import all_finite
 
 
 def checked_piece(audio: ArrayLike) -> NDArray[np.float32]:
@@ -14,7 +15,7 @@ def checked_piece(audio: ArrayLike) -> NDArray[np.float32]:
         raise FacesynthError(f"audio has shape {list(samples.shape)}; wanted mono samples [S]: take the mean of the channels")
     if samples.dtype.kind != "f":
         raise FacesynthError(f"audio is {samples.dtype}; wanted floats in -1..1: divide samples of 16 bits by 32768")
-    if not np.isfinite(samples).all():
+    if not all_finite(samples):
         raise FacesynthError("audio holds NaN or infinite samples; export the sound again")
     return samples.astype(np.float32, copy=False)
 

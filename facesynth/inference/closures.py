@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .arrays import Floats
 from .layout import Layout
+from .long_arrays import copied, let_go
 from .lips import Span, gap, has_lips, pair_gaps
 
 FADING_S = 0.03
@@ -69,7 +70,7 @@ def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: flo
     """
     if not has_lips(layout):
         return frames
-    out = frames.copy()
+    out = copied(frames)
     points, pairs = layout.points(out), len(layout.lip_pairs)
     for start, stop in spans:
         heights = gap(out[start:stop], layout)
@@ -83,6 +84,7 @@ def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: flo
         some = points[near]
         _bring_together(some, layout, correction)
         points[near] = some
+        let_go(out)
     return out
 
 

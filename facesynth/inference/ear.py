@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .checks import checked_audio, checked_piece
 from .errors import FacesynthError
 from .graphs import Part
+from .long_arrays import let_go, loudest
 
 RATE = 16000
 """Of the sound, Hz."""
@@ -98,7 +99,7 @@ class Ear:
 
     def _of_whole(self, audio: ArrayLike) -> "Iterator[_Block]":
         sound = checked_audio(audio)
-        state = replace(self.start(), heard=_long_enough(sound), peak=float(np.abs(sound).max()))
+        state = replace(self.start(), heard=_long_enough(sound), peak=loudest(sound))
         return self._blocks(state, ended=True)
 
     def start(self) -> EarState:
@@ -135,6 +136,7 @@ class Ear:
         peak = max(state.peak, float(np.abs(window).max()))
         log_probabilities, hidden = self.network(audio=(window * np.float32(PEAK / max(peak, SMALLEST_PEAK)))[None])
         rows = slice(state.frames - begin, stop - begin)
+        let_go(state.heard)
         kept = max(state.first, stop - self.reach.before)
         after = EarState(state.heard[(kept - state.first) * STEP :], kept, stop, peak)
         return _Block(log_probabilities[0, rows], hidden[0, rows], after)
@@ -147,4 +149,4 @@ class _Block(NamedTuple):
 
 
 def _long_enough(sound: Single) -> Single:
-    return np.pad(sound, (0, max(0, SHORTEST - len(sound))))
+    return sound if len(sound) >= SHORTEST else np.pad(sound, (0, SHORTEST - len(sound)))

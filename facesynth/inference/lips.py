@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FacesynthError
 from .layout import Layout
+from .long_arrays import by_blocks
 from .motion import Motion
 from .phones import BILABIALS
 from .speech import PhoneTrack
@@ -34,7 +35,8 @@ def pair_gaps(frames: NDArray[Any], layout: Layout) -> NDArray[Any]:
 
 def gap(frames: NDArray[Any], layout: Layout) -> NDArray[Any]:
     """[T] opening of the inner lips of frames [T, C]: mean of `pair_gaps`; NaN where a point is missing."""
-    return np.asarray(pair_gaps(frames, layout).mean(axis=1))
+    opening = by_blocks(lambda some: pair_gaps(some, layout).mean(axis=1), frames, np.result_type(frames, np.float32))
+    return np.asarray(opening)
 
 
 def lip_gap(motion: Motion) -> NDArray[np.float32]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .checks import checked_piece, require_open
 from .errors import FacesynthError
+from .long_arrays import Growing, let_go
 
 BLOCK = 1 << 20
 """Output samples that are computed at once."""
@@ -25,12 +26,13 @@ def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float3
     if rate == new_rate:
         return audio
     count, around = -(-len(audio) * new_rate // rate), REACH * max(1, -(-rate // new_rate)) + 2
-    parts = []
+    parts = Growing()
     for start in range(0, max(1, count), BLOCK):  # sums in float64 of the whole would be four times as large as the sound
         stop = min(start + BLOCK, count)
         first, last = max(0, start * rate // new_rate - around), stop * rate // new_rate + around
-        parts.append(_resampled(audio[first:last], first, start, stop, rate, new_rate))
-    return np.concatenate(parts)
+        parts.add(_resampled(audio[first:last], first, start, stop, rate, new_rate))
+        let_go(audio)
+    return parts.whole()
 
 
 class Resampler:

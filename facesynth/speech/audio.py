@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import Growing, all_finite, let_go, row_blocks
 from facesynth.inference.sound import KAISER_BETA, REACH, Resampler
 from facesynth.inference.wav import FIRST_CHUNK, find_samples
 from facesynth.packages import is_installed
@@ -78,7 +79,7 @@ def read_sound(path: str | Path) -> Recorded:
     sound = _read_plain(path) or Recorded(*read_container(path))
     if not len(sound.audio):
         raise FacesynthError(f"{path} holds 0 samples of sound; record it again")
-    if not np.isfinite(sound.audio).all():
+    if not all_finite(sound.audio):
         raise FacesynthError(f"{path} holds NaN or infinite samples; export the sound again")
     return sound
 
@@ -99,8 +100,10 @@ def resample(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np
 def _piece_by_piece(audio: NDArray[np.float32], rate: int, new_rate: int) -> NDArray[np.float32]:
     """By the ground floor's filter, which computes in float64: a block at a time holds memory down."""
     resampler = Resampler(rate, new_rate)
-    parts = [resampler.push(audio[first : first + BLOCK]) for first in range(0, len(audio), BLOCK)]
-    return np.concatenate([*parts, resampler.finish()])
+    parts = Growing()
+    for rows in row_blocks(audio):
+        parts.add(resampler.push(audio[rows]))
+    return parts.add(resampler.finish()).whole()
 
 
 def _in_blocks(audio: NDArray[np.float32], up: int, down: int, around: int) -> NDArray[np.float32]:
@@ -109,12 +112,13 @@ def _in_blocks(audio: NDArray[np.float32], up: int, down: int, around: int) -> N
 
     convolved = _resampler(up, down)
     size, margin = -(-BLOCK // down) * down, -(-around // down) * down
-    parts = []
+    parts = Growing()
     for first in range(0, max(1, len(audio)), size):
         begin = max(0, first - margin)
         piece = torch.from_numpy(np.ascontiguousarray(audio[begin : first + size + margin]))
-        parts.append(convolved(piece).numpy()[(first - begin) // down * up :][: size // down * up])
-    return np.concatenate(parts)
+        parts.add(convolved(piece).numpy()[(first - begin) // down * up :][: size // down * up])
+        let_go(audio)
+    return parts.whole()
 
 
 @lru_cache(maxsize=8)
@@ -174,8 +178,8 @@ def no_speech() -> FacesynthError:
 def loudest_db(audio: NDArray[np.float32], rate: int) -> float:
     """RMS of the loudest 50 ms block around its own mean, dB of full scale; -inf for digital silence."""
     block = max(1, round(SHORTEST_S * rate))
-    whole = np.asarray(audio[: len(audio) // block * block], np.float64).reshape(-1, block)
-    loudest = float(whole.std(axis=1).max())
+    whole = audio[: len(audio) // block * block].reshape(-1, block)
+    loudest = max(float(whole[rows].astype(np.float64).std(axis=1).max()) for rows in row_blocks(whole))
     return float(20 * np.log10(loudest)) if loudest > 0 else -np.inf
 
 
@@ -188,11 +192,10 @@ def _read_plain(path: Path) -> Recorded | None:
             stored = opened.enter_context(open(path, "rb"))
             source, remarks = _mended(opened, stored)
             with soundfile.SoundFile(source) as file:
-                parts = one_channel(partial(_blocks, file))
+                audio = one_channel(partial(_blocks, file))
                 rate, priming = int(file.samplerate), _priming(stored) if file.format in MPEG else 0
     except (soundfile.LibsndfileError, RuntimeError):
         return None
-    audio = np.concatenate(parts) if parts else np.zeros(0, np.float32)
     if priming:
         remarks = (*remarks, *unstated_priming("mp3", priming, rate))
     return Recorded(audio[priming:], rate, remarks)

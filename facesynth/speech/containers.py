@@ -103,16 +103,17 @@ def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
         begin = beginning(path)
         if begin.sound_s is None:
             raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
-        times_s: list[float] = []
-        parts = one_channel(partial(_blocks, path, times_s))
+        blocks: list[tuple[float, int]] = []
+        strung = one_channel(partial(_blocks, path, blocks))
     except FacesynthError:
         raise
     except (av.FFmpegError, ValueError) as error:  # damaged titles are no Unicode, damaged streams no layout that is known
         reason = getattr(error, "strerror", "") or error
         raise FacesynthError(f"{path} cannot be read as sound or video ({reason}); is it damaged?") from None
-    if not parts:
-        return np.zeros(0, np.float32), begin.rate, ()
-    audio, remarks = laid(path, parts, np.array(times_s[: len(parts)]) - begin.zero_s, begin.rate)
+    if not blocks:
+        return strung, begin.rate, ()
+    times_s, lengths = zip(*blocks, strict=True)
+    audio, remarks = laid(path, strung, lengths, np.array(times_s) - begin.zero_s, begin.rate)
     return audio, begin.rate, (*begin.remarks(), *remarks)
 
 
@@ -156,17 +157,18 @@ def _time_s(frame: Any) -> float | None:
     return None if frame is None or frame.pts is None else float(frame.pts * frame.time_base)
 
 
-def _blocks(path: Path, times_s: list[float]) -> Iterator[Floats]:
-    """The decoded sound in blocks [n, channels]; the time of each is appended to `times_s`."""
+def _blocks(path: Path, found: list[tuple[float, int]]) -> Iterator[Floats]:
+    """The decoded sound in blocks [n, channels]; `found` becomes the time of each, NaN where it has none, and its length."""
     import av
 
+    found.clear()
     with av.open(str(path)) as container:
         rate = int(container.streams.audio[0].rate)
         resampler = av.AudioResampler(format="fltp", rate=rate)
         for frame in _with_end(container):
             for block in resampler.resample(frame):
                 time_s = _time_s(block)
-                times_s.append(np.nan if time_s is None else time_s)
+                found.append((np.nan if time_s is None else time_s, block.samples))
                 yield block.to_ndarray().T.astype(np.float32)
 
 
@@ -175,13 +177,15 @@ def _with_end(container: InputContainer) -> Iterator[Any]:
     yield None
 
 
-def laid(path: Path, parts: Sequence[Floats], times_s: NDArray[np.float64], rate: int) -> tuple[Floats, tuple[str, ...]]:
+def laid(
+    path: Path, sound: Floats, lengths: Sequence[int], times_s: NDArray[np.float64], rate: int
+) -> tuple[Floats, tuple[str, ...]]:
     """Blocks of sound where their times say [S], silence between them; and what was noticed.
 
-    times_s: [N] when each block begins; NaN where the file does not say: right after the one before. What lies before 0 is
+    sound: the blocks strung together, lengths: [N] their samples; times_s: [N] when each block begins; NaN where the file does not say: right after the one before. What lies before 0 is
     left out. Where blocks overlap, the later one is kept.
     """
-    strung = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+    strung = np.concatenate([[0], np.cumsum(lengths)])
     moved = _moved(times_s * rate - strung[:-1], rate)
     jumps = np.diff(moved, prepend=moved[0])
     if np.abs(jumps).sum() + max(moved[0], 0) > LONGEST_SILENCE_S * rate:
@@ -193,9 +197,11 @@ def laid(path: Path, parts: Sequence[Floats], times_s: NDArray[np.float64], rate
             f"{path}: at {place_s:.2f} s of its sound the time stamps go back by {back_s:.2f} s, as where two recordings were"
             " strung together; cut it there"
         )
+    if not moved.any():
+        return sound, ()
     audio = np.zeros(max(int((places + np.diff(strung)).max()), 0), np.float32)
-    for place, part in zip(places, parts, strict=True):
-        kept = part[max(-place, 0) :]
+    for place, first, stop in zip(places, strung[:-1], strung[1:], strict=True):
+        kept = sound[min(first + max(-place, 0), stop) : stop]
         audio[max(place, 0) : max(place, 0) + len(kept)] = kept
     return audio, tuple(_said(jumps, places / rate, rate))
 

@@ -133,8 +133,8 @@ def doubtful(spikes: Sequence[Spike], words: Sequence[Word]) -> list[int]:
 def heard_classes(audio: NDArray[np.float32], rate: int) -> Classes:
     """[T, 15] logarithms of the probabilities of viseme classes in a sound [S], 50 frames a second."""
     hearing = phone_hearing()
-    log_probabilities, _ = Ear(hearing.network).hear(resample(audio, rate, hearing.rate))
-    return class_log_probabilities(log_probabilities, hearing.alphabet)
+    heard = Ear(hearing.network).read(resample(audio, rate, hearing.rate))
+    return np.concatenate([class_log_probabilities(block, hearing.alphabet) for block in heard])
 
 
 def fit_by_chance(classes: Classes, spikes: Sequence[Spike]) -> float:

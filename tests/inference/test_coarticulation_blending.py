@@ -8,10 +8,10 @@ from facesynth.inference.coarticulation.blending import (
     WAKE_S,
     KeyShapes,
     WeightModels,
-    anchor_weights,
     anchors_of,
     blend_key_shapes,
     blend_share,
+    blended,
     cover,
 )
 from facesynth.inference.speech import PhoneTrack
@@ -56,14 +56,14 @@ def test_without_triphones_every_interval_has_a_diphone():
 
 def test_weights_meet_the_anchors_and_are_the_polynomials_between_them():
     anchors_s, times_s = np.array([0.1, 0.3, 0.4]), np.array([0.0, 0.1, 0.15, 0.3, 0.35, 0.4, 0.9])
-    weights = anchor_weights(np.array([0, 1, 2]), anchors_s, times_s, models())
+    weights = blended(np.array([0, 1, 2]), np.eye(3), anchors_s, times_s, models())
     expected = [[1, 0, 0], [1, 0, 0], [0.75, 0.25, 0], [0, 1, 0], [0, 0.5, 0.5], [0, 0, 1], [0, 0, 1]]
     assert weights == pytest.approx(np.array(expected, float))
 
 
 def test_two_triphones_are_faded_over_the_interval_that_they_share():
     anchors_s = np.arange(4.0)
-    weights = anchor_weights(np.array([0, 1, 2, 3]), anchors_s, np.array([0.5, 1.25, 2.5]), models((0, 1, 2), (1, 2, 3)))
+    weights = blended(np.array([0, 1, 2, 3]), np.eye(4), anchors_s, np.array([0.5, 1.25, 2.5]), models((0, 1, 2), (1, 2, 3)))
     share = float(blend_share(np.array([0.25]))[0])
     first = np.array([1 - 0.625, 0.5, 0.625, 0])  # of the first triphone at t = 1.25 / 2
     second = np.array([0, 1 - 0.125, 0.5, 0.125])  # of the second at t = 0.25 / 2

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import all_finite, let_go
 from facesynth.speech.audio import resample
 
 if TYPE_CHECKING:
@@ -108,11 +109,12 @@ class _Voice:
     def _block(self) -> None:
         import av
 
-        block = self.samples[None, self.done : self.done + _SOUND_BLOCK]
+        block = np.clip(self.samples[None, self.done : self.done + _SOUND_BLOCK], -1, 1)
         frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(block), format="fltp", layout="mono")
         frame.sample_rate, frame.pts, frame.time_base = _SOUND_RATE, self.done, Fraction(1, _SOUND_RATE)
         self.container.mux(self.stream.encode(frame))
         self.done += block.shape[1]
+        let_go(self.samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +162,14 @@ def _mono(container: av.container.InputContainer, rate: int) -> Iterator[NDArray
 def _sound_at_file_rate(audio: ArrayLike, sample_rate: int) -> NDArray[np.float32]:
     """[S] at 48 kHz: every player takes it, and the last block of AAC then adds less than a frame of silence."""
     sound = np.asarray(audio, np.float32)
-    if sound.ndim != 1 or not len(sound) or not np.isfinite(sound).all():
+    if sound.ndim != 1 or not len(sound) or not all_finite(sound):
         raise FacesynthError(f"the sound must be finite mono samples [S], S > 0; got shape {sound.shape}")
     if not 1000 <= sample_rate <= 384000:
         raise FacesynthError(f"the sound's rate must be 1000 to 384000 Hz; got {sample_rate}")
     if sample_rate != _SOUND_RATE:
         wanted = round(len(sound) * Fraction(_SOUND_RATE, int(sample_rate)))
         sound = resample(sound, int(sample_rate), _SOUND_RATE)[:wanted]
-    return np.clip(sound, -1, 1)
+    return sound
 
 
 def _checked_frame(frame: NDArray[np.uint8], size: tuple[int, int] | None) -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.atomic import write_text
+from facesynth.atomic import atomic_path
 from facesynth.face.animation import FaceAnimation
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
@@ -66,10 +66,10 @@ def _apart(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def write_livelink(path: str | Path, take: LiveLinkTake) -> None:
     """Write a take as the app does, ten decimals, Unix line ends."""
-    rows = [",".join(HEADER)]
-    for time, values in zip(take.timecodes, take.values + 0.0, strict=True):  # + 0.0: no minus zeros
-        rows.append(f"{time},{COUNT}," + ",".join(f"{value:.10f}" for value in values))
-    write_text(path, "\n".join(rows) + "\n")
+    with atomic_path(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(HEADER) + "\n")
+        for time, values in zip(take.timecodes, take.values, strict=True):
+            file.write(f"{time},{COUNT}," + ",".join(f"{value + 0.0:.10f}" for value in values) + "\n")  # + 0.0: no minus zeros
 
 
 def read_livelink(path: str | Path, fps: float | None = None) -> LiveLinkTake:

@@ -16,6 +16,7 @@ from facesynth.face.solve.closures import MOUTH, with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.inference.long_arrays import all_finite
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.arkit_names import ARKIT_NAMES
@@ -161,7 +162,7 @@ def _check_whole(motion: Motion) -> None:
         raise FacesynthError("a motion without frames cannot be put on a face")
     for name in ("frames", "head", "eyes"):
         values = getattr(motion, name)
-        if values is not None and not np.isfinite(values).all():
+        if values is not None and not all_finite(values):
             raise FacesynthError(f"{name} of the motion hold NaN or infinite values; fill the gaps first")
 
 
@@ -176,8 +177,7 @@ def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArr
     if is_of_the_head(motion.layout):
         return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
     fit = fit_layout(rig, motion.layout, rest_of(motion))
-    frames = fit.on_head(rig, motion.frames).reshape(len(motion), -1)
-    weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), frames, motion.fps, known)
+    weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), motion.frames, motion.fps, known)
     lips = LipGap.of(rig)
     met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
     return close_within_jaw(with_lips_apart(met, lips), lips), residual

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -15,12 +16,13 @@ from facesynth.face.rig.markers import marker_vertices
 from facesynth.face.solve.bounded import solve
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.inference.long_arrays import let_go
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
 if TYPE_CHECKING:
     from facesynth.face.solve.fitting import LayoutFit
 
-BLOCK = 4096
+BLOCK = 2048
 """Frames whose markers are held in double precision at once."""
 RIDGE = 2e-4
 """Share of the mean squared shape length that a shape pays for being used."""
@@ -50,10 +52,13 @@ class MarkerBasis:
     """[52] shapes that are solved for; the others keep the weights they are given."""
     gap_rows: NDArray[np.float64]
     """[P, 3K] picks the vertical distance of each pair of facing lip markers."""
+    placed: Callable[[ArrayLike], NDArray[np.float64]] | None = None
+    """Frames of the layout to markers on the head [t, K, 3], mm; None where they are that already."""
 
     def offsets(self, frames: ArrayLike, piece: slice) -> NDArray[np.float64]:
         """[t, 3K] how far the markers of some frames are from rest, mm."""
-        return np.asarray(np.asarray(frames)[piece], np.float64) - self.rest_mm
+        some = np.asarray(frames)[piece]
+        return np.asarray(some if self.placed is None else self.placed(some), np.float64).reshape(len(some), -1) - self.rest_mm
 
     @classmethod
     def of(cls, rig: Rig, layout: Layout) -> MarkerBasis:
@@ -69,7 +74,8 @@ class MarkerBasis:
         """The basis of points that a fit has put on the head; of 2-D points nothing is known along the third axis."""
         pairs = tuple((int(upper), int(lower)) for upper, lower in fit.lip_pairs)
         seen = np.array([1.0, 1.0, float(layout.dimension == 3)])
-        return cls._at(rig, fit.vertices, rig.rest_mm[fit.vertices].ravel(), pairs, seen)
+        basis = cls._at(rig, fit.vertices, rig.rest_mm[fit.vertices].ravel(), pairs, seen)
+        return replace(basis, placed=partial(fit.on_head, rig))
 
     @classmethod
     def _at(
@@ -85,7 +91,7 @@ class MarkerBasis:
 def solve_markers(
     basis: MarkerBasis, frames: ArrayLike, fps: float, known: ArrayLike | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights [T, 52] of marker frames [T, 3K] (mm, head motion removed), and the residual [T] (mm, root mean square).
+    """Weights [T, 52] of frames [T, C] of the basis's layout, head motion removed, and the residual [T] (mm, root mean square).
 
     known: [T, 52] weights of the shapes that are not solved for (gaze, tongue); zero where not given. Their
     share of the motion is taken off the markers first.
@@ -96,7 +102,10 @@ def solve_markers(
     lift = np.concatenate([np.eye(basis.shapes_mm.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
     shapes = basis.shapes_mm[basis.free] @ lift
     onto = np.linalg.qr(shapes.T)[0]  # what lies outside of the shapes' span changes no weight
-    wanted = [(basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto) for piece in pieces]
+    wanted = []
+    for piece in pieces:
+        wanted.append((basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto))
+        let_go(np.asarray(frames))
     weights[:, basis.free] = solve(shapes @ onto, np.concatenate(wanted), basis.ridge[basis.free], fps=fps)
     residual_mm = np.empty(len(weights))
     for piece in pieces:
@@ -104,6 +113,7 @@ def solve_markers(
         weights[piece] = follow_gap(basis, weights[piece], offsets)
         off = (weights[piece] @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
         residual_mm[piece] = np.sqrt((off**2).sum(axis=2).mean(axis=1))
+        let_go(np.asarray(frames))
     return weights, residual_mm
 
 

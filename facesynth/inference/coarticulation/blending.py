@@ -138,34 +138,37 @@ def blend_share(t: Floats) -> Floats:
     return np.asarray(early / (early + (1 - BLEND_SHARE) * t ** (BLEND_POWER + 1)))
 
 
-def anchor_weights(classes: Ints, anchors_s: Floats, times_s: Floats, models: WeightModels) -> Floats:
-    """[T, n] how much the key shape of each of n anchors counts at each time; before the first and after the last it is held."""
-    weights = np.zeros((len(times_s), len(anchors_s)))
-    times_s = np.clip(times_s, anchors_s[0], anchors_s[-1])
+def blended(classes: Ints, keys: Floats, anchors_s: Floats, times_s: Floats, models: WeightModels) -> Floats:
+    """[T, D] the key shapes [n, D] of n anchors, each counting as the models say at each time; before the first and after the last
+    one is held. Times [T] rise.
+
+    A span of models looks at its own frames and anchors alone, so that time and memory grow with the length, not with its square.
+    """
     if len(anchors_s) == 1:
-        return np.ones_like(weights)
+        return np.repeat(keys, len(times_s), axis=0)
+    out = np.zeros((len(times_s), keys.shape[1]))
+    times_s = np.clip(times_s, anchors_s[0], anchors_s[-1])
     interval = np.clip(np.searchsorted(anchors_s, times_s, side="right") - 1, 0, len(anchors_s) - 2)
+    first_rows = np.searchsorted(interval, np.arange(len(anchors_s)))
     spans = cover(classes, models)
     for span, before in zip(spans, [None, *spans], strict=False):
         shared = span.first if before is not None and before.last > span.first else -1
-        rows = np.flatnonzero((interval >= span.first) & (interval < span.last))
+        rows = slice(first_rows[span.first], first_rows[span.last])
         t = (times_s[rows] - anchors_s[span.first]) / (anchors_s[span.last] - anchors_s[span.first])
         polynomials = (
             models.diphones[classes[span.first], classes[span.last]] if span.triphone < 0 else models.triphones[span.triphone]
         )
         own = np.vander(t, polynomials.shape[1], increasing=True) @ polynomials.T
-        fading = np.zeros(len(rows))
+        fading = np.zeros(len(t))
         if shared >= 0:
             here = interval[rows] == shared
             length_s = anchors_s[shared + 1] - anchors_s[shared]
-            fading[here] = blend_share((times_s[rows[here]] - anchors_s[shared]) / length_s)
-        weights[rows] *= fading[:, None]
-        weights[rows, span.first : span.last + 1] += (1 - fading)[:, None] * own
-    return weights
+            fading[here] = blend_share((times_s[rows][here] - anchors_s[shared]) / length_s)
+        out[rows] = fading[:, None] * out[rows] + (1 - fading)[:, None] * (own @ keys[span.first : span.last + 1])
+    return out
 
 
 def blend_key_shapes(phones: PhoneTrack, classes: Ints, keys: Floats, models: WeightModels, times_s: Floats) -> Floats:
-    """[T, D] displacements from rest: classes [P] and key shapes [P, D] of the phones, blended at times [T]."""
+    """[T, D] displacements from rest: classes [P] and key shapes [P, D] of the phones, blended at rising times [T]."""
     anchors = anchors_of(phones)
-    weights = anchor_weights(classes[anchors.phones], anchors.times_s, times_s, models)
-    return np.asarray(weights @ keys[anchors.phones])
+    return blended(classes[anchors.phones], keys[anchors.phones], anchors.times_s, times_s, models)

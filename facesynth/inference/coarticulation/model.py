@@ -14,6 +14,7 @@ from ..filters import gaussian
 from ..folder import Folder
 from ..graphs import Graph
 from ..layout import Layout
+from ..long_arrays import by_blocks
 from ..lips import bilabial_spans, has_lips
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONE_INDEX, PHONES, VISEMES, viseme_of
@@ -69,11 +70,14 @@ class Coarticulation:
         shapes = gaussian(blend_key_shapes(phones, classes, keys, self.parts.models, times_s), SMOOTHING_S * self.fps)
         if not has_lips(self.layout):
             shapes = hold_keys(shapes, keys, phones, self.fps)
-        frames = self.parts.decode(shapes.astype(np.float32)).astype(np.float64)
-        if self.layout.kind == "curves":
-            frames = np.clip(frames, 0, 1)
+        frames = by_blocks(self._decoded, shapes.astype(np.float32))
         frames = close_at(frames, self.layout, bilabial_spans(phones, self.fps), self.parts.closed_gap, self.fps)
-        return Motion(frames.astype(np.float32), self.fps, self.layout)
+        return Motion(frames, self.fps, self.layout)
+
+    def _decoded(self, shapes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Displacements [t, D] to frames [t, C]."""
+        frames = self.parts.decode(shapes)
+        return np.clip(frames, 0, 1) if self.layout.kind == "curves" else frames
 
 
 def hold_keys(shapes: Floats, keys: Floats, phones: PhoneTrack, fps: float) -> Floats:

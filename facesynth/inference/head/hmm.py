@@ -19,6 +19,7 @@ from ..arrays import Floats, Ints
 from ..checks import checked_audio, checked_seed
 from ..errors import reject_options
 from ..layout import Layout
+from ..long_arrays import by_blocks
 from ..motion import Motion
 from ..pitch import RATE
 from ..quaternions import from_angles, squad, to_rotvec
@@ -47,7 +48,7 @@ class Network:
     """[N] which model each state belongs to."""
 
 
-def most_likely(network: Network, log_likelihood: Floats) -> tuple[float, Ints]:
+def most_likely(network: Network, log_likelihood: NDArray[np.floating[Any]]) -> tuple[float, Ints]:
     """Log probability of the most likely way through the network, and its states [T] (Viterbi)."""
     best = network.log_start + log_likelihood[0]
     before = np.empty((len(log_likelihood), len(best)), np.min_scalar_type(len(best)))
@@ -118,5 +119,5 @@ class HeadHmm:
         bounds = pairwise([*range(0, count, MOST_WINDOWS), count])
         pieces = (self.windows.cut(audio, 0, first, stop).astype(np.float64) for first, stop in bounds)
         prosody = prosody_of(pieces, HEARD_FPS)
-        (log_likelihood,) = self.log_likelihood(prosody=prosody.astype(np.float32)[None])
-        return self.network.clusters[most_likely(self.network, log_likelihood[0].astype(np.float64))[1]]
+        heard = by_blocks(lambda some: self.log_likelihood(prosody=some[None])[0][0], prosody.astype(np.float32))
+        return self.network.clusters[most_likely(self.network, heard)[1]]
