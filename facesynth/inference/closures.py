@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from .arrays import Floats
 from .layout import Layout
-from .long_arrays import copied, let_go
+from .long_arrays import Growing, copied, let_go, row_blocks
 from .lips import Span, gap, has_lips, pair_gaps
 
+FADED = 9
+"""Standard deviations beyond which a bump is nothing: under 1e-17 of its height."""
 FADING_S = 0.03
 """Standard deviation of the bump that `close_lips` narrows the mouth by, seconds."""
 SHUT_SHARE = 0.25
@@ -31,19 +33,23 @@ def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: NDArray[n
 
     Both lips move half of the way, fading over 30 ms.
     """
-    out = frames.copy()
-    now, at = gap(out, layout), np.arange(len(frames))
-    push = np.zeros(len(frames))
+    now, at = gap(frames, layout), np.arange(len(frames))
+    push, reach = np.zeros(len(frames)), int(FADED * FADING_S * fps) + 1
     for target, start, stop in zip(wanted, bounds[:-1], bounds[1:], strict=True):
         if np.isfinite(target) and stop > start:
             k = start + int(now[start:stop].argmin())
             excess = max(now[k] - target, 0.0)
-            push = np.maximum(push, excess * np.exp(-0.5 * ((at - k) / (FADING_S * fps)) ** 2))
+            near = slice(max(0, k - reach), k + reach + 1)
+            push[near] = np.maximum(push[near], excess * np.exp(-0.5 * ((at[near] - k) / (FADING_S * fps)) ** 2))
     upper, lower = np.array(layout.lip_pairs).T
-    points = layout.points(out)
-    points[:, upper, 1] -= push[:, None] / 2
-    points[:, lower, 1] += push[:, None] / 2
-    return out
+    parts = Growing(frames.dtype)
+    for rows in row_blocks(frames):
+        some = frames[rows].copy()
+        points = layout.points(some)
+        points[:, upper, 1] -= push[rows, None] / 2
+        points[:, lower, 1] += push[rows, None] / 2
+        parts.add(some)
+    return parts.whole()
 
 
 def keep_shut(changed: Floats, before: Floats, layout: Layout) -> Floats:

@@ -17,6 +17,7 @@ from .filters import cubic_at
 from .folder import Folder
 from .graphs import Graph
 from .heard import exported_hear
+from .long_arrays import BLOCK_ROWS, joined
 from .phones import PHONES
 from .sound import resample
 from .speech import NEUTRAL, Speech
@@ -163,7 +164,14 @@ class Expectation:
     def poses(self, bands: Single, said: Said, fps: float, count: int) -> Floats:
         """[count, D] at `fps`: bands [F, B] of the sound."""
         at = np.arange(count, dtype=np.float64) * (self.reading.rate / fps)
-        return cubic_at(self.frames(bands, said, 0, int(np.floor(at[-1] + 1e-9)) + 1 + BEYOND), at)
+        stop = int(np.floor(at[-1] + 1e-9)) + 1 + BEYOND
+        return joined((self._between(bands, said, at[a : a + BLOCK_ROWS], stop) for a in range(0, count, BLOCK_ROWS)), np.float64)
+
+    def _between(self, bands: Single, said: Said, at: Floats, stop: int) -> Floats:
+        """[n, D] at places [n] among the network's frames, of which there are `stop`."""
+        first = max(0, int(np.floor(at[0])) - 1)
+        last = min(stop, int(np.floor(at[-1] + 1e-9)) + 1 + BEYOND)
+        return cubic_at(self.frames(bands, said, first, last), at - first)
 
     def frames(self, bands: Single, said: Said, first: int, stop: int, bands_from_s: float = 0.0) -> Floats:
         """[stop - first, D] the network's own frames; bands_from_s: where the first of the bands lies."""

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats
+from .long_arrays import by_columns, by_overlapping_blocks
 
 PASS, ORDER = 0.9, 6
 """Movement up to this share of the new rate's Nyquist frequency is kept when a rate falls, by a Butterworth filter."""
@@ -30,6 +31,11 @@ def sharpen(frames: Floats, share: float, fps: float) -> Floats:
     """
     if share == 0:
         return frames
+    reach = int(4 * (ROUGH_S + QUICK_S) * fps) + 2
+    return by_overlapping_blocks(lambda some: _sharpened(some, share, fps), frames, reach)
+
+
+def _sharpened(frames: Floats, share: float, fps: float) -> Floats:
     smooth = without_roughness(frames, fps)
     return smooth + share * (smooth - gaussian(smooth, QUICK_S * fps))
 
@@ -147,6 +153,10 @@ def cubic_at(signal: Floats, at: Floats) -> Floats:
 
 def at_rate(frames: Floats, fps: float, new_fps: float, at: Floats) -> Floats:
     """Frames [T, C] read at places [n] in old frames; movement that the new rate cannot carry is filtered out first."""
+    return by_columns(lambda some: _at_rate(some, fps, new_fps, at), frames, len(at))
+
+
+def _at_rate(frames: Floats, fps: float, new_fps: float, at: Floats) -> Floats:
     if falls(fps, new_fps) and len(frames) > 1:
         frames = forth_and_back(butterworth(ORDER, PASS * new_fps / fps), frames, reach_of(len(frames), fps, new_fps))
     return spline_at(frames, at)

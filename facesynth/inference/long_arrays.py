@@ -61,6 +61,17 @@ def joined(parts: Iterable[NDArray[Any]], dtype: DTypeLike = np.float32) -> NDAr
     return growing.whole()
 
 
+def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+    """Zeros to be written over, in a file where they are large."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    if size <= LARGE_BYTES:
+        return np.zeros(shape, dtype)
+    with tempfile.TemporaryFile() as file:
+        file.truncate(size)
+        pages = mmap.mmap(file.fileno(), size)
+    return np.frombuffer(pages, dtype).reshape(shape)
+
+
 def row_blocks(values: NDArray[Any]) -> Iterator[slice]:
     """Stretches of the first axis that cover an array; what was seen of it leaves memory before the next one comes."""
     size = max(1, BLOCK_BYTES // max(1, values[:1].nbytes))
@@ -73,6 +84,26 @@ def row_blocks(values: NDArray[Any]) -> Iterator[slice]:
 def by_blocks(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """What a change of single rows makes of an array, done block by block."""
     return joined((change(values[rows]) for rows in row_blocks(values)), dtype)
+
+
+def by_overlapping_blocks(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], reach: int) -> NDArray[Any]:
+    """The same of a change whose rows depend on so many rows before and after them as well, in double precision."""
+    parts = Growing(np.float64)
+    for rows in row_blocks(values):
+        first = max(0, rows.start - reach)
+        parts.add(change(values[first : rows.stop + reach])[rows.start - first : rows.stop - first])
+    return parts.whole()
+
+
+def by_columns(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], count: int) -> NDArray[Any]:
+    """What a change of single columns makes of an array [T, C]: [count, C], in double precision."""
+    out = zeros((count, values.shape[1]))
+    size = max(1, BLOCK_BYTES // max(1, max(len(values), count) * out.itemsize))
+    for first in range(0, values.shape[1], size):
+        out[:, first : first + size] = change(np.asarray(values[:, first : first + size], np.float64))
+        let_go(values)
+        let_go(out)
+    return out
 
 
 def copied(values: NDArray[Any]) -> NDArray[Any]:

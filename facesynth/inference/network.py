@@ -16,6 +16,7 @@ from .folder import Folder
 from .heard import exported_hear
 from .layout import Layout
 from .lips import bilabial_spans
+from .long_arrays import Growing, by_blocks, let_go
 from .motion import Motion
 from .phones import PHONE_INDEX, SILENCE
 from .residual import ResidualMotion, exported_residual, main_emotion
@@ -26,6 +27,8 @@ HOP = round(RATE / BANDS_FPS)
 """Samples from one frame of bands to the next."""
 HALF_WINDOW = 256
 """Samples on either side of its centre that a frame of bands depends on."""
+PIECE = 3000
+"""Frames of bands that are heard at once."""
 AROUND = 3
 """Frames of bands that are heard once more beside new ones: the first of a piece lack what came before it."""
 
@@ -59,14 +62,14 @@ class Network:
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """What is expected, sharpened, lips closed at p, b and m, and what moves beside the lips. Nothing is random."""
         reject_options("network", options, ("seed",))
-        bands = self.hear(resample(speech.audio, speech.sample_rate, RATE))
+        bands = bands_of(self.hear, resample(speech.audio, speech.sample_rate, RATE))
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         frames = self.expectation.poses(bands, Said.of(speech, self.emotions), self.fps, count)
         frames = sharpen(frames, self.sharpening, self.fps)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         if self.residual is not None:
-            frames = frames + self.residual.track(speech, main_emotion(speech, self.emotions), self.fps, count)
-        return Motion(frames.astype(np.float32), self.fps, self.layout)
+            frames = self.residual.added(frames, speech, main_emotion(speech, self.emotions), self.fps)
+        return Motion(by_blocks(np.asarray, frames), self.fps, self.layout)
 
     def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> "SoundStream":
         """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
@@ -83,6 +86,17 @@ class Network:
             raise unknown("emotion", felt, self.emotions)
         checked_rate(RATE if sample_rate is None else sample_rate, RATE)
         return SoundStream(self, self.emotions.index(felt))
+
+
+def bands_of(hear: Callable[[Single], Single], sound: Single) -> Single:
+    """[F, B] what is heard in a sound [S] at RATE, heard piece by piece: the bands of a frame depend on little around it."""
+    count, parts = 1 + len(sound) // HOP, Growing()
+    for first in range(0, count, PIECE):
+        begin, stop = max(0, first - AROUND), min(first + PIECE, count)
+        end = len(sound) if stop == count else (stop + AROUND) * HOP
+        parts.add(hear(sound[begin * HOP : end])[first - begin : stop - begin])
+        let_go(sound)
+    return parts.whole()
 
 
 class SoundStream:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .filters import cubic_at, gaussian
 from .folder import Folder
+from .long_arrays import BLOCK_ROWS, Growing, let_go, row_blocks
 from .sound import resample
 from .speech import Speech
 
@@ -33,15 +34,24 @@ ARRAYS = ("frames", "basis", "loudness", "bounds", "emotions")
 
 def loudness(speech: Speech, fps: float, count: int) -> Floats:
     """[count] logarithm of the sound's energy around each frame at `fps`, with mean 0 and deviation 1."""
-    sound = resample(speech.audio, speech.sample_rate, RATE).astype(np.float64)
-    hop = RATE / fps
-    sums = np.concatenate([[0.0], np.cumsum(sound**2)])
+    sound, hop = resample(speech.audio, speech.sample_rate, RATE), RATE / fps
     edges = np.clip(np.round((np.arange(count + 1) - 0.5) * hop).astype(np.int64), 0, len(sound))
     heard = np.maximum(np.diff(edges), 1)
-    energy = np.diff(sums[edges]) / heard
+    energy = _energies(sound, edges) / heard
     energy[heard < hop / 4] = energy[max(0, int((heard >= hop / 4).sum()) - 1)]  # after the end it stays as loud
     smooth = gaussian(np.log(energy + FLOOR), max(SMOOTH_S * fps, 1e-3)) if count else energy
     return np.asarray((smooth - smooth.mean()) / max(float(smooth.std()), 1e-6)) if count else smooth
+
+
+def _energies(sound: NDArray[np.float32], edges: NDArray[np.int64]) -> Floats:
+    """[n] sums of the squares of a sound between neighbouring edges [n + 1]."""
+    parts = []
+    for first in range(0, len(edges) - 1, BLOCK_ROWS):
+        own = edges[first : first + BLOCK_ROWS + 1]
+        sums = np.concatenate([[0.0], np.cumsum(sound[own[0] : own[-1]].astype(np.float64) ** 2)])
+        parts.append(np.diff(sums[own - own[0]]))
+        let_go(sound)
+    return np.concatenate(parts) if parts else np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +72,26 @@ class ResidualMotion:
     share: float = 1.0
     """How much of it is added; 1 as recorded."""
 
+    def added(self, frames: Floats, speech: Speech, emotion: int, fps: float) -> Floats:
+        """Frames [T, C] at `fps` with what moves beside the lips in a speech and an emotion.
+
+        Other recordings stand in where there are none in the emotion.
+        """
+        components, basis = self.components(speech, emotion, fps, len(frames)), self.basis.astype(np.float64)
+        parts = Growing(frames.dtype)
+        for rows in row_blocks(frames):
+            parts.add(frames[rows] + (self.share * (components[rows] @ basis)).astype(frames.dtype))
+        return parts.whole()
+
     def track(self, speech: Speech, emotion: int, fps: float, count: int) -> Floats:
-        """[count, C] at `fps` for a speech in an emotion, of which other recordings stand in where there are none."""
+        """[count, C] what `added` adds."""
+        return self.added(np.zeros((count, self.basis.shape[1])), speech, emotion, fps)
+
+    def components(self, speech: Speech, emotion: int, fps: float, count: int) -> Floats:
+        """[count, R] at `fps`."""
         own = max(2, int(np.ceil(count / fps * self.fps)) + 2)
         chosen = self._chosen(loudness(speech, self.fps, own), emotion, own)
-        return self.share * cubic_at(
-            chosen @ self.basis.astype(np.float64), np.arange(count, dtype=np.float64) * (self.fps / fps)
-        )
+        return cubic_at(chosen, np.arange(count, dtype=np.float64) * (self.fps / fps))
 
     def _chosen(self, wanted: Floats, emotion: int, count: int) -> Floats:
         """[count, R] stretches whose loudness is like the wanted one [count], each faded into the next."""

@@ -15,6 +15,7 @@ from ..expectation import Bands, Expectation, Said
 from ..filters import sharpen
 from ..layout import Layout
 from ..lips import bilabial_spans
+from ..long_arrays import by_blocks
 from ..motion import Motion
 from ..phones import PHONE_INDEX, PHONES
 from ..speech import Speech
@@ -95,9 +96,9 @@ class AnimeGraph:
         """
         reject_options("anime_graph", options, OPTIONS)
         smooth = self.low_pass(self.joined(self.plan(speech, look_ahead=look_ahead)))
-        frames = self.decode(sharpen(smooth, self.sharpening, self.fps))
+        frames = by_blocks(self.decode, sharpen(smooth, self.sharpening, self.fps), np.float64)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
-        motion = self.mapper.with_intensity(Motion(frames.astype(np.float32), self.fps, self.layout), speech)
+        motion = self.mapper.with_intensity(Motion(by_blocks(np.asarray, frames), self.fps, self.layout), speech)
         return motion if to_emotion is None else self.mapper.map_along(motion, speech, to_emotion, intensity=to_intensity)
 
     def joined(self, plan: Plan) -> Floats:

@@ -70,9 +70,9 @@ class Coarticulation:
         shapes = gaussian(blend_key_shapes(phones, classes, keys, self.parts.models, times_s), SMOOTHING_S * self.fps)
         if not has_lips(self.layout):
             shapes = hold_keys(shapes, keys, phones, self.fps)
-        frames = by_blocks(self._decoded, shapes.astype(np.float32))
+        frames = by_blocks(self._decoded, shapes.astype(np.float32), np.float64)
         frames = close_at(frames, self.layout, bilabial_spans(phones, self.fps), self.parts.closed_gap, self.fps)
-        return Motion(frames, self.fps, self.layout)
+        return Motion(by_blocks(np.asarray, frames), self.fps, self.layout)
 
     def _decoded(self, shapes: NDArray[np.float32]) -> NDArray[np.float32]:
         """Displacements [t, D] to frames [t, C]."""

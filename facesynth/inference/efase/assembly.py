@@ -7,6 +7,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..filters import gaussian
+from ..long_arrays import Growing, let_go, row_blocks
 from ..phones import SILENCE
 from ..warp import time_warp
 from .nodes import Nodes
@@ -15,8 +16,8 @@ from .soft import Mixture, mean_motion
 
 def smooth_joint(
     frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float = 1.0, strength: float = 1.0
-) -> Floats:
-    """Frames [T, D] with a share `strength` of the jump between `joint - 1` and `joint` smoothed over `reach` frames each way.
+) -> None:
+    """Smooth, in frames [T, D], a share `strength` of the jump between `joint - 1` and `joint` over `reach` frames each way.
 
     `min_g sum_k w_k (g_k - f_k)² + stiffness · ∫ g''²` (Deng 2008, eq. 13), a weighted cubic smoothing
     spline over the frame numbers; weights [T], large where a frame must stay. The correction g - f
@@ -25,14 +26,12 @@ def smooth_joint(
     first, stop = max(joint - reach, 0), min(joint + reach, len(frames))
     piece = frames[first:stop]
     if len(piece) < 3:
-        return frames
+        return
     spline = smoothing_spline if len(piece) >= 5 else _penalised
     correction = spline(piece, weights[first:stop], stiffness) - piece
     rise = np.clip(np.arange(len(piece)) / max(joint - first - 1, 1), 0, 1)
     fall = np.clip(np.arange(len(piece))[::-1] / max(stop - joint - 1, 1), 0, 1)
-    smooth = frames.copy()
-    smooth[first:stop] = piece + strength * np.minimum(rise, fall)[:, None] * correction
-    return smooth
+    frames[first:stop] += strength * np.minimum(rise, fall)[:, None] * correction
 
 
 def smoothing_spline(piece: Floats, weights: Floats, stiffness: float) -> Floats:
@@ -102,7 +101,7 @@ def concatenate(
         frames[start:stop] = (
             mean_motion(nodes, mixture, stop - start) if mixture else time_warp(nodes.motion(int(path[t])), stop - start)
         )
-    frames = _smooth_joints(frames, nodes, path, phones, bounds, fps, smoothing, mixtures)
+    _smooth_joints(frames, nodes, path, phones, bounds, fps, smoothing, mixtures)
     for first, stop in _runs(~spoken):
         if expected is None:
             _fill_silence(frames, int(bounds[first]), int(bounds[stop]), rest[first], fps)
@@ -130,7 +129,7 @@ def _smooth_joints(
     fps: float,
     smoothing: Smoothing,
     mixtures: Sequence[Mixture | None] | None,
-) -> Floats:
+) -> None:
     weight = {**dict.fromkeys(FIRM, smoothing.firm), **dict.fromkeys(LOOSE, smoothing.loose)}
     weights = np.repeat([weight.get(phone, 1.0) for phone in phones], np.diff(bounds))
     reach = max(3, round(smoothing.reach_s * fps))
@@ -142,8 +141,7 @@ def _smooth_joints(
             continue
         inside = min(reach, int(bounds[place] - bounds[place - 1]), int(bounds[place + 1] - bounds[place]))
         if inside > 0:
-            frames = smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
-    return frames
+            smooth_joint(frames, int(bounds[t]), inside, weights, stiffness, strength)
 
 
 def _jump(nodes: Nodes, path: Ints, phones: Sequence[str], mixtures: Sequence[Mixture | None] | None, t: int) -> float:
@@ -207,4 +205,8 @@ def blend(neutral: Floats, expressive: Floats, intensity: Floats, bounds: Ints, 
     Between neutral and full emotion (named as missing in Deng 2008).
     """
     share = gaussian(np.repeat(intensity, np.diff(bounds)), SMOOTH_S * fps)[:, None]
-    return neutral + share * (expressive - neutral)
+    parts = Growing(np.float64)
+    for rows in row_blocks(neutral):
+        parts.add(neutral[rows] + share[rows] * (expressive[rows] - neutral[rows]))
+        let_go(expressive)
+    return parts.whole()

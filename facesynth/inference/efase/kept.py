@@ -17,6 +17,7 @@ from ..efase.nodes import Nodes
 from ..efase.search import Search, SearchIndex
 from ..efase.steps import step_matrix
 from ..expectation import Single
+from ..long_arrays import row_blocks
 from ..speech import Speech
 
 SEARCHES_BYTES = 1 << 28
@@ -159,7 +160,7 @@ class KeptHearing(Hearing):
 
 
 def _sound_key(speech: Speech) -> Hashable:
-    return (speech.sample_rate, len(speech.audio), hash(speech.audio.tobytes()))
+    return (speech.sample_rate, len(speech.audio), *(hash(speech.audio[rows].tobytes()) for rows in row_blocks(speech.audio)))
 
 
 def query_key(query: Query) -> Hashable:

@@ -23,6 +23,7 @@ from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import at_rate, sharpen
 from ..layout import Layout
+from ..long_arrays import Growing, by_blocks, row_blocks
 from ..lips import gap, has_lips
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
@@ -139,13 +140,17 @@ class Efase:
         feelings, intensity = speech.emotions.per_phone(speech.phones)
         frames = self.frames(plans, labels, feelings, intensity, frame_bounds(ends_s, self.database_fps))
         made = self.resampled(frames, new_fps, int(frame_bounds(ends_s, new_fps)[-1]))
-        return Motion(made + self.beside_lips(speech, new_fps, len(made)), new_fps, self.layout)
+        return Motion(self.with_residual(made, speech, new_fps), new_fps, self.layout)
 
     def beside_lips(self, speech: Speech, fps: float, count: int) -> NDArray[np.float32]:
         """[count, C] recorded movement that is added beside the lips; 0 where the model keeps none."""
+        return self.with_residual(np.zeros((count, self.layout.channels), np.float32), speech, fps)
+
+    def with_residual(self, frames: NDArray[np.float32], speech: Speech, fps: float) -> NDArray[np.float32]:
+        """Frames [T, C] with recorded movement beside the lips, as they are where the model keeps none."""
         if self.parts.residual is None:
-            return np.zeros((count, self.layout.channels), np.float32)
-        return self.parts.residual.track(speech, main_emotion(speech, self.emotions), fps, count).astype(np.float32)
+            return frames
+        return self.parts.residual.added(frames, speech, main_emotion(speech, self.emotions), fps)
 
     def plan(
         self,
@@ -232,7 +237,7 @@ class Efase:
         if has_lips(self.layout):
             wanted = np.max([self._closures(plan, labels) for plan in plans], axis=0)
             frames = close_lips(frames, wanted, self.layout, bounds, self.database_fps)
-        return frames.astype(np.float32).astype(np.float64)
+        return by_blocks(lambda some: some.astype(np.float32), frames, np.float64)
 
     def resampled(self, frames: Floats, fps: float, count: int) -> NDArray[np.float32]:
         """[count, C] frames at another rate."""
@@ -241,8 +246,12 @@ class Efase:
             new = np.arange(max(round(len(frames) / self.database_fps * fps), 1))
             made = at_rate(frames, self.database_fps, fps, np.minimum(new * self.database_fps / fps, len(frames) - 1))
             if self.layout.kind == "curves":
-                made = np.clip(made, frames.min(axis=0), frames.max(axis=0))
-        return made[np.minimum(np.arange(count), len(made) - 1)].astype(np.float32)
+                low, high = frames.min(axis=0), frames.max(axis=0)
+                made = by_blocks(lambda some: np.clip(some, low, high), made, np.float64)
+        parts = Growing()
+        for rows in row_blocks(made[:count]):
+            parts.add(made[rows])
+        return parts.add(np.repeat(made[-1:], max(0, count - len(made)), axis=0)).whole()
 
     def coordinates(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         """[T, D] PCA coordinates of a plan, silence at rest in each phone's feeling, not yet sharpened."""
@@ -255,7 +264,7 @@ class Efase:
         return self._frames_of(sharpen(coordinates, self.settings.sharpening, self.database_fps))
 
     def _frames_of(self, coordinates: Floats) -> Floats:
-        return self.parts.decode(coordinates.astype(np.float32)).astype(np.float64)
+        return by_blocks(lambda some: self.parts.decode(some.astype(np.float32)), coordinates, np.float64)
 
     def _require_steps(self) -> None:
         """A mean over paths, and a pose that is expected, look at the whole of what is said."""
