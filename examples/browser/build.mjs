@@ -6,4 +6,4 @@ mkdirSync("site/ort", { recursive: true });
 for (const name of readdirSync(from)) {
   if (name === "ort.wasm.min.mjs" || /^ort-wasm-simd-threaded\.(mjs|wasm)$/.test(name)) cpSync(`${from}/${name}`, `site/ort/${name}`);
 }
-for (const name of ["index.html", "main.js", "model.js", "head.js"]) cpSync(name, `site/${name}`);
+for (const name of readdirSync(".")) if (/\.(html|js)$/.test(name)) cpSync(name, `site/${name}`);

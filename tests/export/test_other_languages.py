@@ -1,20 +1,15 @@
 """The same folder from JavaScript: in Node, and in a page of a real browser with the network cut off."""
 
 import base64
-import functools
-import http.server
 import json
-import os
 import shutil
-import signal
 import struct
 import subprocess
 import sys
-import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import a_browser, colours, installed, visited
 
 from facesynth.corpus import Corpus, Record
 from facesynth.inference import load
@@ -23,10 +18,7 @@ from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.audio import save_wav
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 RATE, FPS = 16000, 30
-WAIT_S = 90
 
 
 def spoken(loudness, rng):
@@ -57,20 +49,6 @@ def talking_head(rig, tmp_path_factory):
     LDS(**quick).fit(corpus).save(home / "lds.safetensors")
     save_wav(home / "speech.wav", spoken(np.array([0, 1, 0.2, 0.8, 0.1, 1, 0]), rng).audio, RATE)
     return home / "lds.safetensors", home / "speech.wav"
-
-
-def installed(example):
-    """The example's folder with what npm installs; skips where that cannot be had."""
-    npm = shutil.which("npm")
-    if npm is None:
-        pytest.skip("npm is not installed")
-    folder = EXAMPLES / example
-    if not (folder / "node_modules" / "onnxruntime-web").is_dir():
-        command = [npm, "install", "--no-audit", "--no-fund", "--ignore-scripts"]
-        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=1800)
-        if done.returncode:
-            pytest.skip(f"npm cannot install onnxruntime-web here: {done.stderr.strip()[-200:]}")
-    return folder
 
 
 def expected(folder, sound):
@@ -157,25 +135,10 @@ def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
     assert np.abs(np.array(said["frames"]).reshape(wanted.shape) - wanted).max() < 1e-2  # mm
 
 
-class Site(http.server.SimpleHTTPRequestHandler):
-    """Serves the page and takes its report."""
-
-    def log_message(self, *_):
-        pass
-
-    def do_POST(self):
-        self.server.report = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.send_response(204)
-        self.end_headers()
-        self.server.reported.set()
-
-
 @pytest.mark.slow
 def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
     model, sound = talking_head
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if browser is None:
-        pytest.skip("no Chromium is installed (apt-get install chromium)")
+    browser = a_browser()
     example = installed("browser")
     here = tmp_path / "page"
     shutil.copytree(example, here, ignore=shutil.ignore_patterns("site", "node_modules"))
@@ -189,31 +152,3 @@ def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
     picture = base64.b64decode(report["picture"].partition(",")[2])
     (tmp_path / "page.png").write_bytes(picture)
     assert colours(tmp_path / "page.png") > 100  # a shaded head, no empty canvas
-
-
-def visited(browser, site, scratch):
-    """What the page reports. Every other host than this machine is unknown to the browser."""
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Site, directory=str(site)))
-    server.reported, server.report = threading.Event(), {"error": f"no report within {WAIT_S} s"}
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    command = [browser, "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={scratch / 'profile'}"]
-    command += ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-background-networking"]
-    command += ["--proxy-server=127.0.0.1:9", "--proxy-bypass-list=127.0.0.1"]
-    command += ["--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1", f"http://127.0.0.1:{server.server_port}/index.html"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen(command, start_new_session=True, **quiet)
-    try:
-        server.reported.wait(WAIT_S)
-    finally:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        server.shutdown()
-        server.server_close()
-    return server.report
-
-
-def colours(path):
-    from PIL import Image
-
-    with Image.open(path) as picture:
-        return len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0))
