@@ -4,8 +4,8 @@ FOLDER holds any of `grid_s1`, `ravdess_speech` (words known: the reference is t
 labelled by hand). Phone error is Levenshtein distance over phones of the reference, viseme error the same over viseme classes
 with repeats merged; closures are p, b, m whose middles lie within 60 ms of each other, one to one: recall / precision, and how
 many that were heard meet none (false). The real-time factor is processor time over the sound's length, on one thread.
-Of the phones that people placed by hand it tells which a mark at each confidence would catch: a heard phone is right where one of the
-same label lies over its middle.
+Of the phones that people placed by hand it tells which a mark at each confidence would catch: a heard phone is right where one
+of the same label lies over its middle.
 """
 
 import argparse
@@ -217,7 +217,7 @@ def conditions(clips: list[Clip]) -> dict[str, Callable[[Clip], Clip]]:
 
 
 def whispered(clip: Clip) -> Clip:
-    """The vocal tract of the voice (linear prediction of 25 ms, order 18, at 16 kHz), driven by noise in place of the vocal folds."""
+    """The vocal tract of the voice (linear prediction of 25 ms, order 18, at 16 kHz), driven by noise in place of its pulses."""
     audio = resample(clip.audio, clip.rate, RATE)
     window, hop, rng = np.hanning(400), 200, np.random.default_rng(0)
     out = np.zeros(len(audio) + 400)

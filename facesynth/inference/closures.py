@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from .arrays import Floats
 from .layout import Layout
-from .long_arrays import Growing, copied, let_go, row_blocks
 from .lips import Span, gap, has_lips, pair_gaps
+from .long_arrays import Growing, copied, let_go, row_blocks
 
 FADED = 9
 """Standard deviations beyond which a bump is nothing: under 1e-17 of its height."""

@@ -14,11 +14,15 @@ BLOCK_BYTES, BLOCK_ROWS = 4 << 20, 1024
 """Looked at together, at most; of arrays with more than one axis so many rows, of which something larger may be made."""
 
 
+Change = Callable[[NDArray[Any]], NDArray[Any]]
+"""Makes something of an array, or of a part of it."""
+
+
 class Growing:
     """An array that is written part after part, along its first axis.
 
-    It moves to a file as soon as it is large. The file has no name, takes room where the system keeps temporary files, and is gone
-    with the array.
+    It moves to a file as soon as it is large. The file has no name, takes room where the system keeps temporary files, and is
+    gone with the array.
     """
 
     def __init__(self, dtype: DTypeLike = np.float32) -> None:
@@ -33,7 +37,7 @@ class Growing:
         values = np.ascontiguousarray(part, self._dtype)
         self._beside, self._bytes = values.shape[1:], self._bytes + values.nbytes
         if self._file is None and self._bytes > LARGE_BYTES:
-            self._file = tempfile.TemporaryFile()
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `whole`
             for earlier in self._parts:
                 self._file.write(earlier.data)
             self._parts = []
@@ -81,12 +85,12 @@ def row_blocks(values: NDArray[Any]) -> Iterator[slice]:
         let_go(values)
 
 
-def by_blocks(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], dtype: DTypeLike = np.float32) -> NDArray[Any]:
+def by_blocks(change: Change, values: NDArray[Any], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """What a change of single rows makes of an array, done block by block."""
     return joined((change(values[rows]) for rows in row_blocks(values)), dtype)
 
 
-def by_overlapping_blocks(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], reach: int) -> NDArray[Any]:
+def by_overlapping_blocks(change: Change, values: NDArray[Any], reach: int) -> NDArray[Any]:
     """The same of a change whose rows depend on so many rows before and after them as well, in double precision."""
     parts = Growing(np.float64)
     for rows in row_blocks(values):
@@ -95,7 +99,7 @@ def by_overlapping_blocks(change: Callable[[NDArray[Any]], NDArray[Any]], values
     return parts.whole()
 
 
-def by_columns(change: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], count: int) -> NDArray[Any]:
+def by_columns(change: Change, values: NDArray[Any], count: int) -> NDArray[Any]:
     """What a change of single columns makes of an array [T, C]: [count, C], in double precision."""
     out = zeros((count, values.shape[1]))
     size = max(1, BLOCK_BYTES // max(1, max(len(values), count) * out.itemsize))

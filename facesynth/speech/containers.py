@@ -182,8 +182,8 @@ def laid(
 ) -> tuple[Floats, tuple[str, ...]]:
     """Blocks of sound where their times say [S], silence between them; and what was noticed.
 
-    sound: the blocks strung together, lengths: [N] their samples; times_s: [N] when each block begins; NaN where the file does not say: right after the one before. What lies before 0 is
-    left out. Where blocks overlap, the later one is kept.
+    sound: the blocks strung together, lengths: [N] their samples; times_s: [N] when each begins, NaN where the file does not
+    say: right after the one before. What lies before 0 is left out. Where blocks overlap, the later one is kept.
     """
     strung = np.concatenate([[0], np.cumsum(lengths)])
     moved = _moved(times_s * rate - strung[:-1], rate)

@@ -139,8 +139,9 @@ def blend_share(t: Floats) -> Floats:
 
 
 def blended(classes: Ints, keys: Floats, anchors_s: Floats, times_s: Floats, models: WeightModels) -> Floats:
-    """[T, D] the key shapes [n, D] of n anchors, each counting as the models say at each time; before the first and after the last
-    one is held. Times [T] rise.
+    """[T, D] the key shapes [n, D] of n anchors, each counting as the models say at each time [T], which rise.
+
+    Before the first and after the last anchor its shape is held.
 
     A span of models looks at its own frames and anchors alone, so that time and memory grow with the length, not with its square.
     """

@@ -14,8 +14,8 @@ from ..filters import gaussian
 from ..folder import Folder
 from ..graphs import Graph
 from ..layout import Layout
-from ..long_arrays import by_blocks
 from ..lips import bilabial_spans, has_lips
+from ..long_arrays import by_blocks
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONE_INDEX, PHONES, VISEMES, viseme_of
 from ..speech import PhoneTrack, Speech

@@ -14,9 +14,7 @@ from .nodes import Nodes
 from .soft import Mixture, mean_motion
 
 
-def smooth_joint(
-    frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float = 1.0, strength: float = 1.0
-) -> None:
+def smooth_joint(frames: Floats, joint: int, reach: int, weights: Floats, stiffness: float = 1.0, strength: float = 1.0) -> None:
     """Smooth, in frames [T, D], a share `strength` of the jump between `joint - 1` and `joint` over `reach` frames each way.
 
     `min_g sum_k w_k (g_k - f_k)² + stiffness · ∫ g''²` (Deng 2008, eq. 13), a weighted cubic smoothing

@@ -23,8 +23,8 @@ from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import at_rate, sharpen
 from ..layout import Layout
-from ..long_arrays import Growing, by_blocks, row_blocks
 from ..lips import gap, has_lips
+from ..long_arrays import Growing, by_blocks, row_blocks
 from ..motion import Motion
 from ..phones import BILABIALS, LABIODENTALS, PHONES, SILENCE, viseme_of
 from ..residual import ResidualMotion, main_emotion
