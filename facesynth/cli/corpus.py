@@ -164,6 +164,7 @@ def add(
     header = _header(folder, performer, about, listed)
     corpus, guessed = _corpus_for(folder, files, header, followed, given["face"], said, workers)
     known, texts = _words({**about, "id": utterance_id}, text, text_file)
+    guessed = (*guessed, *_encodings(text_file, list_file))
     with cut_for(sound, files) as cuts:
         report = add_recordings(corpus, (*files, *cuts.sounds), known, listed=listed, texts=texts, workers=workers, **given)
     keep_videos_of(corpus, files, report, utterance_id)
@@ -336,6 +337,13 @@ def _some(names: Sequence[str]) -> str:
 
 def _counted(counts: Mapping[str, int]) -> str:
     return ", ".join(what if len(counts) == 1 else f"{what} in {count}" for what, count in sorted(counts.items()))
+
+
+def _encodings(*given: Path | None) -> tuple[str, ...]:
+    """What is said of the files with words whose encoding had to be guessed."""
+    from facesynth.encoding import encoding_remark
+
+    return tuple(remark for path in given if path is not None for remark in encoding_remark(path))
 
 
 def _read_text(path: Path) -> str:

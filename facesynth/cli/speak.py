@@ -198,6 +198,7 @@ def _model_and_speech(given: tuple[Path, ...]) -> tuple[Path, tuple[Path, ...]]:
 
 def _request(text_file: Path | None, given: dict[str, Any]) -> Request:
     """Everything that was asked for, parsed once."""
+    from facesynth.encoding import encoding_remark
     from facesynth.stage.listening import read_text
     from facesynth.stage.request import Request
 
@@ -206,7 +207,7 @@ def _request(text_file: Path | None, given: dict[str, Any]) -> Request:
     if text_file is not None:
         if asked["text"] is not None:
             raise FacesynthError("both --text and --text-file were given; give one")
-        asked["text"] = read_text(text_file)
+        asked |= {"text": read_text(text_file), "remarks": encoding_remark(text_file)}
     return Request(**asked, own=own)
 
 

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from .errors import FacesynthError
 
-LARGEST_BYTES = 2**31
-"""Of a file once unpacked; what is larger is no single recording and no model."""
+LARGEST_BYTES = 2**30
+"""Of a file once unpacked, as its list of contents states before anything is unpacked; what is larger is no single recording
+and no model. Three hours of 90 points at 100 Hz are 1.2 GB: they are to be split."""
 LARGEST_HEADER_BYTES = 1 << 16
 """Of an array in a file."""
 DAMAGE = (

@@ -72,7 +72,7 @@ class ResidualMotion:
     share: float = 1.0
     """How much of it is added; 1 as recorded."""
 
-    def added(self, frames: Floats, speech: Speech, emotion: int, fps: float) -> Floats:
+    def added(self, frames: NDArray[Any], speech: Speech, emotion: int, fps: float) -> NDArray[Any]:
         """Frames [T, C] at `fps` with what moves beside the lips in a speech and an emotion.
 
         Other recordings stand in where there are none in the emotion.

@@ -145,10 +145,11 @@ def _cross_check(audio: NDArray[np.float32], rate: int, words: Sequence[Segment]
 def _heard(audio: NDArray[np.float32], rate: int) -> FoundPhones:
     """By the network, in any language; where it is not installed by pocketsphinx, in English."""
     if is_installed():
-        from facesynth.speech.recognition import recognise
+        from facesynth.speech.recognition import placed, speech_in
 
+        heard, doubts = speech_in(audio, rate)
         remark = "nobody gave the words: phones were heard by a network, about a quarter of them wrongly; a transcript helps"
-        return FoundPhones(recognise(audio, rate), (), (remark,), "recognition")
+        return FoundPhones(placed(audio, rate, heard), (), (remark, *doubts), "recognition")
     from facesynth.speech.decoder_recognition import recognise_by_decoder
 
     remark = (

@@ -67,6 +67,8 @@ class Request:
 
     text: str | None = None
     """What is said."""
+    remarks: tuple[str, ...] = ()
+    """What was assumed when this was put together, such as the encoding of a file; told with each recording."""
     phones: Path | None = None
     """A TextGrid, or lines of `end label`."""
     speaker: str | None = None

@@ -79,7 +79,7 @@ class Production:
             remarks.append(line)
             tell(line)
 
-        for warning in self.stage.warnings:
+        for warning in (*self.stage.warnings, *self.request.remarks):
             remark(f"warning: {warning}")
         heard = listen(recording, self.cast, self.request, remark)
         options = self.cast.options(self.request, heard.speech.phones)

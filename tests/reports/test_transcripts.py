@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from bringing import added, corpus_of, lay_down, run
+from bringing import added, corpus_of, lay_down, run, spoken, talker
 
 from facesynth.corpus.add.transcripts import is_table, read_transcripts
 from facesynth.inference.phones import PHONES
@@ -77,3 +77,23 @@ def test_tables_of_transcripts_as_spreadsheets_write_them(tmp_path, encoding, si
     table.write_bytes(f"id{sign}text\r\na.wav{sign}café, two\r\n".replace(", two", " two").encode(encoding))
     assert is_table(table)
     assert read_transcripts(table) == {"a": "café two"}
+
+
+def test_a_guessed_encoding_is_told_wherever_words_are_given(tmp_path):
+    clips = tmp_path / "clips"
+    sound = lay_down(clips, "a", 3.0)
+    words = tmp_path / "words.txt"
+    words.write_bytes("Frédéric déjà".encode("cp1252"))
+    (tmp_path / "words.csv").write_bytes("id,text\na,Frédéric déjà\n".encode("cp1252"))
+    phones = tmp_path / "a.lab"
+    phones.write_text("1.5 aa\n3.0 pau\n", encoding="utf-8")
+    told = "is not UTF-8; it was read as Latin-1"
+    for given in (words, tmp_path / "words.csv"):
+        report, _ = added(corpus_of(tmp_path), clips, "--phones", phones, "--text-file", given, "--replace")
+        assert [line for line in report["guessed"] if told in line], report
+        (tmp_path / "corpus").rename(tmp_path / given.name.replace(".", "_"))
+    (clips / "list.csv").write_bytes("id,text\na,Frédéric déjà\n".encode("cp1252"))
+    report, _ = added(corpus_of(tmp_path), clips, "--phones", phones)
+    assert [line for line in report["remarks"]["list.csv"] if told in line]
+    _, facts = spoken(talker(tmp_path), sound, tmp_path, "--phones", phones, "--text-file", words)
+    assert [line for line in facts["remarks"] if told in line]

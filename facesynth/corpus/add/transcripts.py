@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.corpus.record import COLUMNS, read_listed
-from facesynth.encoding import text_of
+from facesynth.encoding import encoding_remark, text_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.cells import separator_of
 
@@ -29,6 +29,8 @@ class Tables:
     """Why a table was not used, by its name."""
     used: Mapping[str, Collection[str]] = field(default_factory=dict)
     """Names of the recordings in each table that was."""
+    guessed: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """What is said of the encoding of each of those."""
 
     def remarks(self, recordings: Collection[str]) -> dict[str, tuple[str, ...]]:
         """What each used table was good for, and what it names that is not there."""
@@ -37,7 +39,7 @@ class Tables:
             absent = sorted(set(names) - set(recordings))
             some = ", ".join(absent[:MOST_NAMED]) + (" …" if len(absent) > MOST_NAMED else "")
             more = (f"names {len(absent)} that are not here: {some}",) if absent else ()
-            said[table] = (f"says what is said in {len(names) - len(absent)} recordings", *more)
+            said[table] = (f"says what is said in {len(names) - len(absent)} recordings", *more, *self.guessed.get(table, ()))
         return said
 
 
@@ -57,6 +59,7 @@ def read_tables(paths: Iterable[Path], texts: Mapping[str, str] | None, listed: 
     found: dict[str, str] = {}
     refused: dict[str, str] = {}
     used: dict[str, Collection[str]] = {}
+    guessed: dict[str, tuple[str, ...]] = {}
     for path in paths:
         try:
             if "text" not in _columns(path):
@@ -70,9 +73,10 @@ def read_tables(paths: Iterable[Path], texts: Mapping[str, str] | None, listed: 
         if texts is None and listed is None:
             found |= own
             used[path.name] = tuple(own)
+            guessed[path.name] = encoding_remark(path)
         elif own != texts and (listed is None or not set(own) <= set(listed)):
             refused[path.name] = "a table of what is said; the words came with --text-file or --list instead"
-    return Tables({**found, **(texts or {})}, refused, used)
+    return Tables({**found, **(texts or {})}, refused, used, guessed)
 
 
 def read_transcripts(path: str | Path) -> dict[str, str]:
