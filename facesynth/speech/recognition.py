@@ -37,9 +37,9 @@ def recognise(audio: NDArray[np.float32], rate: int, *, fit: bool = True) -> Pho
     return placed(audio, rate, speech_in(audio, rate)[0], fit=fit)
 
 
-# Music, laughter and breath are heard as phones too, but the network is not sure of them. Mean confidences of stretches: a tune of
-# strings 0.34 to 0.35; speech 0.50 and more, 0.78 at the median; in noise of 5 dB, in babble and over a telephone 0.34 and more, with
-# one stretch of thirty below UNSURE.
+# Music, laughter and breath are heard as phones too, but the network is not sure of them. Mean confidences of stretches: a tune
+# of strings 0.34 to 0.35; speech 0.50 and more, 0.78 at the median; in noise of 5 dB, in babble and over a telephone 0.34 and
+# more, with up to 8 % of the stretches below UNSURE.
 def speech_in(audio: NDArray[np.float32], rate: int) -> tuple[list[Spike], tuple[str, ...]]:
     """Phones heard in a sound, without stretches that are hardly speech; and a remark on each of those, and on doubtful ones.
 
@@ -53,7 +53,9 @@ def speech_in(audio: NDArray[np.float32], rate: int) -> tuple[list[Spike], tuple
         sure = _sure(stretch)
         where = f"from {stretch[0].first_s:.1f} to {stretch[-1].last_s:.1f} s"
         if hardly:
-            remarks.append(f"{where} what is heard is hardly speech ({sure:.0%} sure): music, laughter or breath? The lips rest there")
+            remarks.append(
+                f"{where} what is heard is hardly speech ({sure:.0%} sure): music, laughter or breath? The lips rest there"
+            )
             continue
         if len(stretch) >= FEWEST and sure < UNSURE:
             remarks.append(f"{where} phones were heard in much doubt ({sure:.0%} sure): is it speech?")
@@ -68,7 +70,7 @@ def _sure(stretch: Sequence[Spike]) -> float:
 
 
 def _hardly(found: Sequence[Sequence[Spike]]) -> list[bool]:
-    """Whether each stretch is hardly speech; one that is too short to be judged, and in doubt, goes with the nearest that is not."""
+    """Whether each stretch is hardly speech; one in doubt that is too short to be judged goes with the nearest that is not."""
     judged = [(stretch[0].first_s, _sure(stretch) < HARDLY) for stretch in found if len(stretch) >= FEWEST]
 
     def nearest(stretch: Sequence[Spike]) -> bool:

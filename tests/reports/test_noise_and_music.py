@@ -87,7 +87,9 @@ class Heard:
 
     def spikes(self, audio, rate):
         return [
-            Spike("aa", start_s + 0.1 * k, start_s + 0.1 * k, sure, False) for start_s, count, sure in self.stretches for k in range(count)
+            Spike("aa", start_s + 0.1 * k, start_s + 0.1 * k, sure, False)
+            for start_s, count, sure in self.stretches
+            for k in range(count)
         ]
 
 
@@ -97,7 +99,11 @@ def test_stretches_that_are_hardly_speech_are_left_out_and_told_with_their_times
     monkeypatch.setattr("facesynth.speech.recognition.phone_hearing", lambda: heard)
     kept, remarks = speech_in(sound, 16000)
     assert sorted({round(spike.confidence, 2) for spike in kept}) == [0.39, 0.45, 0.8, 0.9]
-    assert [remark[:25] for remark in remarks] == ["from 2.5 to 3.0 s what is", "from 4.0 to 4.1 s what is", "from 6.0 to 6.4 s phones "]
+    assert [remark[:25] for remark in remarks] == [
+        "from 2.5 to 3.0 s what is",
+        "from 4.0 to 4.1 s what is",
+        "from 6.0 to 6.4 s phones ",
+    ]
     heard.stretches = [(1.0, 3, 0.3)]
     with pytest.raises(FacesynthError, match="no speech is heard"):
         speech_in(sound, 16000)
