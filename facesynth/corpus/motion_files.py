@@ -1,6 +1,7 @@
 """Motion as other programs write it: NPZ and CSV, of any rate, with or without the head's motion in it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from facesynth.corpus.importers.description import Written
 from facesynth.corpus.npz import read_npz
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
+from facesynth.inference.long_arrays import Growing, by_blocks, row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.motion.cells import read_cells
 from facesynth.motion.irregular import USUAL_FPS
@@ -43,7 +45,7 @@ def load_motion(path: str | Path, layout: Layout, fps: float, written: Written |
         except ValueError as error:
             raise FacesynthError(f"{path}: {error}") from None
         remarks = ()
-    if not len(motion) or np.isinf(motion.frames).any():
+    if not len(motion) or any(np.isinf(motion.frames[rows]).any() for rows in row_blocks(motion.frames)):
         raise FacesynthError(f"{path} holds no frames, or infinite values; export it again")
     fitted, more = into_corpus(motion, layout, fps)
     return fitted, (*remarks, *more)
@@ -73,8 +75,11 @@ def with_points_of(layout: Layout, motion: Motion) -> tuple[Motion, tuple[str, .
         raise FacesynthError(f"{len(lacking)} of the {len(layout.names)} {layout.kind} wanted are not in it: {near}")
     left = len(own.names) - len(layout.names)
     remarks = (f"{left} {own.kind} that the corpus does not have were left out",) if left else ()
-    points = motion.points[:, [places[name] for name in layout.names]]
-    return Motion(points.reshape(len(motion), layout.channels), motion.fps, layout, motion.head, motion.eyes), remarks
+    if own.names == layout.names:
+        return replace(motion, layout=layout), remarks
+    wanted = [places[name] for name in layout.names]
+    frames = by_blocks(lambda some: own.points(some)[:, wanted].reshape(len(some), -1), motion.frames)
+    return Motion(frames, motion.fps, layout, motion.head, motion.eyes), remarks
 
 
 def channel_names(layout: Layout) -> tuple[str, ...]:
@@ -178,7 +183,12 @@ def _without_head(motion: Motion) -> tuple[Motion, str]:
     if layout.neutral is None or "rigid" not in layout.groups:
         return motion, "head motion was left in: the layout has no neutral pose or no group 'rigid' to measure it on"
     neutral = np.reshape(np.array(layout.neutral), (-1, 3))
-    points, head = remove_head(motion.points, neutral, rigid_points(layout))
-    if np.isnan(head).all():
+    frames, heads = Growing(), Growing()
+    for rows in row_blocks(motion.frames):
+        points, head = remove_head(motion.points[rows], neutral, rigid_points(layout))
+        frames.add(points.reshape(len(points), -1))
+        heads.add(head)
+    whole_head = heads.whole()
+    if np.isnan(whole_head).all():
         return motion, "head motion was left in: no frame has three rigid points"
-    return Motion(points.reshape(motion.frames.shape), motion.fps, layout, head, motion.eyes), ""
+    return Motion(frames.whole(), motion.fps, layout, whole_head, motion.eyes), ""

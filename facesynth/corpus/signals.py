@@ -15,7 +15,9 @@ from facesynth.corpus.npz import read_npz
 from facesynth.corpus.record import Record
 from facesynth.corpus.utterance import Utterance
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import row_blocks
 from facesynth.inference.motion import Motion
+from facesynth.inference.npz import write_arrays
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.gaps import LONGEST_S, GapReport, fill_gaps
 from facesynth.motion.pose import fill_head
@@ -105,8 +107,8 @@ def write_motion(path: Path, motion: Motion) -> None:
     """Write motion/ID.npz, atomically; the same motion gives the same bytes."""
     arrays: dict[str, Any] = {"frames": motion.frames, "fps": np.float64(motion.fps)}
     arrays |= {name: value for name, value in (("head", motion.head), ("eyes", motion.eyes)) if value is not None}
-    with atomic_path(path) as part, open(part, "wb") as file:
-        np.savez(file, **arrays)
+    with atomic_path(path) as part:
+        write_arrays(part, arrays)
 
 
 def fit_length(signal: NDArray[np.float32], frames: int, fps: float) -> NDArray[np.float32]:
@@ -127,7 +129,9 @@ def hash_signals(audio: NDArray[np.float32], sample_rate: int, motion: Motion) -
     """sha256 of the sound and the motion of a recording, whatever is said of it."""
     digest = hashlib.sha256(f"{sample_rate} {motion.fps:.6f}".encode())
     for array in (audio, motion.frames, motion.head, motion.eyes):
-        digest.update(b"none" if array is None else str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+        digest.update(b"none" if array is None else str(array.shape).encode())
+        for rows in () if array is None else row_blocks(array):
+            digest.update(np.ascontiguousarray(array[rows]).tobytes())
     return digest.hexdigest()
 
 

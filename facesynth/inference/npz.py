@@ -9,14 +9,15 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FacesynthError
+from .long_arrays import BLOCK_BYTES, LARGE_BYTES, Growing, row_blocks
 
 LARGEST_BYTES = 2**30
 """Of a file once unpacked, as its list of contents states before anything is unpacked; what is larger is no single recording
@@ -62,16 +63,45 @@ def _read(path: Path, what: str, wanted: set[str] | None) -> dict[str, NDArray[A
         raise FacesynthError(f"{path} is not {what}: the file is missing")
     try:
         with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
+            sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
+            size = sum(sizes.values())
     except DAMAGE as error:
         raise FacesynthError(_no_archive(path, what, error)) from None
     if size > LARGEST_BYTES:
         raise FacesynthError(f"{path} would unpack to {size / 1e9:.1f} GB, more than {what} can hold; split it")
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files if wanted is None or name in wanted}
+            names = [name for name in stored.files if wanted is None or name in wanted]
+            return {name: _large(path, name) if sizes.get(f"{name}.npy", 0) > LARGE_BYTES else stored[name] for name in names}
     except DAMAGE as error:
         raise FacesynthError(f"{path} is not {what}, or is damaged ({_reason(error)})") from None
+
+
+def _large(path: Path, name: str) -> NDArray[Any]:
+    """An array that is read piece by piece, into a file that is mapped."""
+    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as member:
+        shape, in_columns, dtype = _header(member)
+        if dtype.hasobject:
+            raise ValueError(f"{name} holds objects")
+        pieces = Growing(dtype)
+        while piece := member.read(BLOCK_BYTES // dtype.itemsize * dtype.itemsize):
+            pieces.add(np.frombuffer(piece, dtype))
+        flat = pieces.whole()
+    return flat.reshape(shape[::-1]).T if in_columns else flat.reshape(shape)
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """What `numpy.savez` writes, piece by piece; the same arrays give the same bytes."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                values = np.asanyarray(array)
+                if values.nbytes <= LARGE_BYTES or not values.flags.c_contiguous:
+                    np.lib.format.write_array(member, values, allow_pickle=False)
+                    continue
+                np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(values))
+                for rows in row_blocks(values):
+                    member.write(values[rows].tobytes())
 
 
 def _no_archive(path: Path, what: str, error: BaseException) -> str:
@@ -86,6 +116,13 @@ def _reason(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
+def _header(member: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape of an array, whether it lies column by column, and its type."""
+    version = np.lib.format.read_magic(member)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    return read(member)
+
+
 def _view(content: bytes, entry: zipfile.ZipInfo) -> NDArray[Any]:
     """One array where it lies: the local header's two lengths say where its bytes begin, numpy's header what they are."""
     if entry.compress_type != zipfile.ZIP_STORED:
@@ -93,9 +130,7 @@ def _view(content: bytes, entry: zipfile.ZipInfo) -> NDArray[Any]:
     name_bytes, extra_bytes = struct.unpack_from("<HH", content, entry.header_offset + 26)
     start = entry.header_offset + 30 + name_bytes + extra_bytes
     member = io.BytesIO(content[start : start + min(entry.file_size, LARGEST_HEADER_BYTES)])
-    version = np.lib.format.read_magic(member)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, in_columns, dtype = read(member)
+    shape, in_columns, dtype = _header(member)
     if dtype.hasobject:
         raise ValueError(f"{entry.filename} holds objects")
     flat = np.frombuffer(content, dtype, int(np.prod(shape, dtype=np.int64)), start + member.tell())

@@ -9,8 +9,12 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.filters import ORDER, PASS, falls, reach_of
+from facesynth.inference.long_arrays import let_go, zeros
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import missing_in
+
+TOGETHER = 8
+"""Points that are brought to another rate at once: those of a long recording together would take ten times its memory."""
 
 
 def resample(motion: Motion, fps: float) -> Motion:
@@ -26,9 +30,7 @@ def resample(motion: Motion, fps: float) -> Motion:
     if fps == motion.fps:
         return motion
     change = _Change.between(motion.fps, fps, len(motion))
-    frames = _points(change, motion.frames, motion.layout.dimension)
-    if motion.layout.kind == "curves":
-        frames = _within(frames, motion.frames)
+    frames = _frames(change, motion)
     return Motion(frames, fps, motion.layout, _head(change, motion.head), _eyes(change, motion.eyes))
 
 
@@ -69,6 +71,19 @@ class _Change:
         """[T, n] which old samples are missing → [T', n] which new ones are."""
         near = 1e-6
         return missing[np.floor(self.at + near).astype(int)] | missing[np.ceil(self.at - near).astype(int)]
+
+
+def _frames(change: _Change, motion: Motion) -> NDArray[np.float32]:
+    """[T, C] → [T', C], some points at a time."""
+    out = zeros((len(change.at), motion.layout.channels), np.float32)
+    each = motion.layout.dimension * TOGETHER
+    for first in range(0, motion.layout.channels, each):
+        some = np.ascontiguousarray(motion.frames[:, first : first + each])
+        new = _points(change, some, motion.layout.dimension)
+        out[:, first : first + each] = _within(new, some) if motion.layout.kind == "curves" else new
+        let_go(motion.frames)
+        let_go(out)
+    return out
 
 
 def _points(change: _Change, frames: NDArray[np.float32], dimension: int) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.long_arrays import Growing, all_finite, let_go, row_blocks
+from facesynth.inference.long_arrays import Growing, all_finite, by_blocks, let_go, row_blocks
 from facesynth.inference.sound import KAISER_BETA, REACH, Resampler
 from facesynth.inference.wav import FIRST_CHUNK, find_samples
 from facesynth.packages import is_installed
@@ -142,13 +142,19 @@ def save_wav(path: str | Path, audio: NDArray[np.float32], rate: int) -> None:
 
     with atomic_path(path) as part:
         try:
-            soundfile.write(part, np.clip(audio, -1.0, 1.0), rate, format="WAV", subtype="PCM_16")
+            with soundfile.SoundFile(part, "w", rate, 1, "PCM_16", format="WAV") as file:
+                for rows in row_blocks(audio):
+                    file.write(np.clip(audio[rows], -1.0, 1.0))
         except soundfile.LibsndfileError as error:  # a full disk, a limit on file sizes
             raise OSError(EIO, f"the sound cannot be written ({error})") from error
 
 
 def as_saved(audio: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
     """What `load_audio` gives back of a mono sound [S] once `save_wav` has written it."""
+    return by_blocks(lambda some: _saved(some, rate), audio)
+
+
+def _saved(audio: NDArray[np.float32], rate: int) -> NDArray[np.float32]:
     import soundfile
 
     with BytesIO() as file:

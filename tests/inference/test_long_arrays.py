@@ -1,10 +1,12 @@
 import mmap
+import struct
 
 import numpy as np
 import pytest
 
 from facesynth.inference import long_arrays
 from facesynth.inference.ear import Ear
+from facesynth.inference.errors import FacesynthError
 from facesynth.inference.filters import at_rate, sharpen
 from facesynth.inference.long_arrays import Growing, all_finite, by_blocks, copied, joined, let_go, loudest, row_blocks, zeros
 from facesynth.inference.sound import resample
@@ -71,3 +73,37 @@ def test_a_sound_in_a_file_is_heard_as_one_in_memory(monkeypatch):
     wanted = np.concatenate(list(Ear(network).read(sound)))
     monkeypatch.setattr(long_arrays, "LARGE_BYTES", 100)
     assert np.array_equal(np.concatenate(list(Ear(network).read(copied(sound)))), wanted)
+
+
+def test_large_arrays_are_written_as_numpy_does_and_read_back_from_a_file(tmp_path, monkeypatch):
+    from facesynth.inference import npz
+
+    rng = np.random.default_rng(0)
+    arrays = {"frames": rng.normal(size=(400, 9)).astype(np.float32), "fps": np.float64(30), "turned": rng.normal(size=(5, 70)).T}
+    np.savez(tmp_path / "numpy.npz", **arrays)
+    np.savez_compressed(tmp_path / "packed.npz", **arrays)
+    for module in (long_arrays, npz):
+        monkeypatch.setattr(module, "LARGE_BYTES", 1000)
+    npz.write_arrays(tmp_path / "ours.npz", arrays)
+    assert (tmp_path / "ours.npz").read_bytes() == (tmp_path / "numpy.npz").read_bytes()
+    for name in ("ours.npz", "packed.npz"):
+        found = npz.read_all_arrays(tmp_path / name, "arrays")
+        assert all(np.array_equal(found[key], value) for key, value in arrays.items())
+    damaged = bytearray((tmp_path / "ours.npz").read_bytes())
+    damaged[4000] ^= 1
+    (tmp_path / "ours.npz").write_bytes(damaged)
+    with pytest.raises(FacesynthError, match="damaged"):
+        npz.read_all_arrays(tmp_path / "ours.npz", "arrays")
+
+
+def test_a_file_that_states_more_than_a_gigabyte_is_refused_before_anything_is_unpacked(tmp_path, monkeypatch):
+    from facesynth.inference import npz
+
+    path = tmp_path / "large.npz"
+    np.savez(path, frames=np.zeros((10, 4), np.float32))
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<I", content, content.index(b"PK\x01\x02") + 24, 2**31 - 1)  # what the list of contents states
+    path.write_bytes(content)
+    monkeypatch.setattr(npz.np, "load", None)
+    with pytest.raises(FacesynthError, match=r"would unpack to 2\.1 GB"):
+        npz.read_all_arrays(path, "a motion")

@@ -21,6 +21,7 @@ from facesynth.corpus.signals import PARTS, Part, hash_signals, lost_parts, read
 from facesynth.encoding import encoding_remark
 from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import by_blocks
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.planar import is_tracked
@@ -195,7 +196,7 @@ def _captured(corpus: Corpus, recording: Recording, face: int | None) -> _Take:
     sound = read_sound(recording.sound)
     audio, rate, remarks = sound.audio, sound.sample_rate, (*sound.remarks, *remarks)
     sound_s = len(audio) / rate
-    missing = float(np.isnan(motion.frames).mean())
+    missing = float(by_blocks(lambda some: np.isnan(some).mean(axis=1), motion.frames, np.float64).mean())
     if missing > LARGEST_MISSING_SHARE:
         raise FacesynthError(f"{missing:.0%} of the motion's samples are missing, at most half may be")
     lengths = f"the motion lasts {motion.duration_s:.2f} s, the sound {sound_s:.2f} s"
