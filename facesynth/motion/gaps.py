@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import by_blocks, row_blocks
 from facesynth.inference.motion import Motion
 
 LONGEST_S = 0.1
@@ -92,6 +93,8 @@ def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     return np.asarray(np.isnan(values).any(axis=-1))
 
 
+LOOKED_AT = 4096
+"""Frames of a long recording that tell where the body is."""
 FAR = 10.0
 """A point further from the middle of all than this many times their usual distance is no place on the same body."""
 
@@ -102,29 +105,42 @@ def filled_in(points: NDArray[np.floating]) -> NDArray[np.bool_]:
     Such numbers (-16512, 9999.999, 99999, …) stand in all three coordinates, or in one; a marker at exactly three zeros,
     or metres from the face, there is none.
     """
-    nothing = ~np.nan_to_num(points, nan=1.0).any(axis=2)
-    present = np.isfinite(points).all(axis=2) & ~nothing
-    alike = present & (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
-    likely = points[present & ~alike]
+    some = points[:: max(1, len(points) // LOOKED_AT)]
+    present = np.isfinite(some).all(axis=2) & ~_zeros(some)
+    likely = some[present & ~_alike(some)]
     if len(likely) < 3:
-        return nothing
+        return by_blocks(_zeros, points, bool)
     middle = np.median(likely, axis=0)
-    usual = float(np.median(np.abs(likely - middle).max(axis=1)))
-    away = np.abs(np.nan_to_num(points, posinf=np.inf, neginf=-np.inf) - middle).max(axis=2)
-    return np.asarray(
-        nothing | np.isinf(points).any(axis=2) | (present & (away > FAR * max(usual, 1e-9)) & (alike | _again(points)))
-    )
+    far = FAR * max(float(np.median(np.abs(likely - middle).max(axis=1))), 1e-9)
+    commonest = _commonest_extremes(points)
+
+    def gaps(rows: NDArray[np.floating]) -> NDArray[np.bool_]:
+        there = np.isfinite(rows).all(axis=2) & ~_zeros(rows)
+        away = np.abs(np.nan_to_num(rows, posinf=np.inf, neginf=-np.inf) - middle).max(axis=2)
+        again = np.stack([np.isin(rows[..., axis], values) for axis, values in enumerate(commonest)]).any(axis=0)
+        return _zeros(rows) | np.isinf(rows).any(axis=2) | (there & (away > far) & (_alike(rows) | again))
+
+    return by_blocks(gaps, points, bool)
 
 
-def _again(points: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """[T, K] which points have a coordinate whose value is the commonest extreme of all: no two measured ones are the same."""
-    found = np.zeros(points.shape[:2], bool)
-    for axis in range(points.shape[2]):
-        values = points[..., axis]
-        for extreme in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
-            same = values == extreme
-            found |= same if np.count_nonzero(same) > 1 else False
-    return found
+def _zeros(points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    return ~np.nan_to_num(points, nan=1.0).any(axis=2)
+
+
+def _alike(points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    return (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
+
+
+def _commonest_extremes(points: NDArray[np.floating]) -> list[list[float]]:
+    """Of each axis the least and the largest value, where it stands more than once: no two measured ones are the same."""
+    lowest, highest = np.full(points.shape[2], np.inf), np.full(points.shape[2], -np.inf)
+    for rows in row_blocks(points):
+        known = ~np.isnan(points[rows])
+        lowest = np.minimum(lowest, points[rows].min(axis=(0, 1), initial=np.inf, where=known))
+        highest = np.maximum(highest, points[rows].max(axis=(0, 1), initial=-np.inf, where=known))
+    ends = np.stack([lowest, highest])  # [2, 3]
+    counts = sum((points[rows, :, None] == ends).sum(axis=(0, 1)) for rows in row_blocks(points))
+    return [column[count > 1].tolist() for column, count in zip(ends.T, np.transpose(counts), strict=True)]
 
 
 def runs(missing: NDArray[np.bool_], point: int = 0) -> list[Gap]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.inference.long_arrays import by_blocks, row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.inference.npz import LARGEST_BYTES
 from facesynth.inference.speech import PhoneTrack
@@ -68,7 +69,10 @@ def motion_of_arrays(
         raise FacesynthError(f"{path}: {error}") from None
     if not SLOWEST_HZ <= motion.fps <= FASTEST_HZ:
         raise FacesynthError(f"{path} states {motion.fps:g} frames a second; wanted {SLOWEST_HZ:g} to {FASTEST_HZ:g}; give --fps")
-    if not len(motion) or np.isinf(motion.frames).any() or np.isnan(motion.frames).all():
+    unusable = [
+        (np.isinf(some).any(), np.isnan(some).all()) for some in (motion.frames[rows] for rows in row_blocks(motion.frames))
+    ]
+    if not unusable or any(infinite for infinite, _ in unusable) or all(missing for _, missing in unusable):
         raise FacesynthError(f"{path} holds no frames, only missing samples, or infinite values; export it again")
     return motion
 
@@ -79,7 +83,7 @@ def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
 
 def open_gaps(points: NDArray[np.floating]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
     """Markers [T, K, 3] with NaN where programs wrote a number for a gap, and what is said of it."""
-    unseen = filled_in(points) & ~np.isnan(points).any(axis=2)
+    unseen = filled_in(points) & ~by_blocks(lambda some: np.isnan(some).any(axis=2), points, bool)
     if not unseen.any():
         return points, ()
     said = f"{np.count_nonzero(unseen)} samples are 0, 0, 0 or far from the face, as programs write gaps: they are gaps"
