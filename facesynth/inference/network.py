@@ -62,7 +62,8 @@ class Network:
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """What is expected, sharpened, lips closed at p, b and m, and what moves beside the lips. Nothing is random."""
         reject_options("network", options, ("seed",))
-        bands = bands_of(self.hear, resample(speech.audio, speech.sample_rate, RATE))
+        sound = resample(speech.audio, speech.sample_rate, RATE)
+        bands = bands_of(self.hear, sound) if self.streams else self.hear(sound)
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         frames = self.expectation.poses(bands, Said.of(speech, self.emotions), self.fps, count)
         frames = sharpen(frames, self.sharpening, self.fps)
