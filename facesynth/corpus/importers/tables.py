@@ -15,6 +15,7 @@ from facesynth.corpus.importers.reading import Reading, motion_of_arrays, requir
 from facesynth.corpus.motion_files import read_csv, shortened, time_column
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Kind, Layout
+from facesynth.inference.long_arrays import by_blocks
 from facesynth.inference.npz import read_all_arrays
 from facesynth.motion.cells import is_number, read_names
 
@@ -62,7 +63,7 @@ def read_table(
     layout = layout or _named_array(path, frames, otherwise)
     frames, remarks = _in_order(path, frames, layout, written)
     if layout.dimension > 1 and frames.shape[1:] == (layout.channels,):
-        frames = written.placed(layout.points(frames)).reshape(len(frames), -1)
+        frames = by_blocks(lambda some: written.placed(layout.points(some)).reshape(len(some), -1), frames)
     head, eyes = (_named(arrays, (name,)) if array.lower() != name else None for name in ("head", "eyes"))
     motion = motion_of_arrays(path, frames, _rate(path, arrays, written, fps), layout, head, eyes)
     return Reading(motion, remarks=remarks)
