@@ -11,13 +11,18 @@ from facesynth.methods.registry import load
 
 def job(page, button, within_s=240):
     """Press a button that starts something, and wait until it is done."""
+    done = ended(page, button, within_s)
+    assert done["code"] == 0, done
+    return done
+
+
+def ended(page, button, within_s=240):
+    """The same, however it ends."""
     before = page.see("facesynth.store.jobs.size")
     page.page.click(button)
     page.until(f"facesynth.store.jobs.size > {before}")
     page.until("[...facesynth.store.jobs.values()].at(-1).code !== null", within_s)
-    done = page.see("[...facesynth.store.jobs.values()].at(-1)")
-    assert done["code"] == 0, done
-    return done
+    return page.see("[...facesynth.store.jobs.values()].at(-1)")
 
 
 def said(page, text):
@@ -37,6 +42,11 @@ def test_a_corpus_is_checked_and_its_transcripts_are_corrected(window, shop):
     assert found.count("→") == page.page.locator("#problems .problem").count() > 0
     page.page.click("#corpus-align")
     said(page, "tick the utterances")
+    page.page.check('[aria-label="Choose s02_neutral_t1"]')
+    aligned = ended(page, "#corpus-align")
+    assert "corpus align" in aligned["command"]
+    assert "--id s02_neutral_t1" in aligned["command"]
+    page.until("document.getElementById('corpus-jobs').textContent.includes('given or corrected by hand')")
 
 
 def test_what_was_removed_is_kept_in_the_corpus_and_markers_move(window, shop):
@@ -82,8 +92,8 @@ def test_models_are_trained_and_judged_from_the_page(chromium, tmp_path):
         page.page.select_option("#corpus-method", "phone_mean")
         job(page, "#corpus-train")
         page.until("facesynth.store.model?.method === 'phone_mean'")
-        assert load(tmp_path / "work" / "models" / "phone_mean.safetensors").trained
-        job(page, "#corpus-evaluate", within_s=600)
+        assert load(tmp_path / "work" / "models" / "phone_mean.safetensors").capabilities.name == "phone_mean"
+        job(page, "#corpus-evaluate", within_s=3600)
         page.until("facesynth.store.reports.length === 1")
         with page.context.expect_page() as opened:
             page.page.click("#corpus a[href^='/reports/']")

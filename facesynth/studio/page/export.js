@@ -44,8 +44,14 @@ export function jobRows(titled = "") {
     const files = job.code === 0 && titled ? exported(job.command) : [];
     const cancel = job.code === null ? make("button", { textContent: "Cancel", onclick: () => ask("cancel", { number: job.number }).catch((e) => say(e.message, true)) }) : null;
     return make("div", { className: "job" }, make("strong", { textContent: `${job.title}: ${state} ` }), cancel,
-      make("div", {}, make("code", { textContent: job.command })), make("div", { textContent: job.code === 0 ? "" : (job.lines.at(-1) ?? "") }), ...files);
+      make("div", {}, make("code", { textContent: job.command })), make("div", { className: "said", textContent: lastSaid(job) }), ...files);
   });
+}
+
+/** How far it is, why it ended early, or the end of what it printed; what is printed for a program is shown elsewhere. */
+function lastSaid({ code, lines, output }) {
+  if (code !== 0) return lines.at(-1) ?? "";
+  return output.startsWith("{") ? "" : output.trimEnd().split("\n").slice(-4).join("\n");
 }
 
 function exported(command) {
