@@ -18,7 +18,7 @@ from pathlib import Path
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.folder import CARD
-from facesynth.zoo.card import Card, Figure, read_card, write_card
+from facesynth.zoo.card import Figure, read_card, write_card
 from facesynth.zoo.shelf import PACKAGED
 
 ROOT = Path(__file__).parent.parent
@@ -41,19 +41,17 @@ def main() -> int:
 def again(path: Path, places: Mapping[str, str], *, write: bool) -> bool:
     """Measure the figures of a card; whether all that could be measured are as it states."""
     card = read_card(path)
-    measured = replace(card, figures=tuple(measure(figure, places) for figure in card.figures))
-    told(path.parent.name, card, measured)
+    measured = replace(card, figures=tuple(told(path.parent.name, figure, measure(figure, places)) for figure in card.figures))
     if write and measured != card:
         write_card(path, measured)
     return measured == card
 
 
-def measure(figure: Figure, places: Mapping[str, str]) -> Figure:
-    """The figure as its command prints it now; as it was where its recordings are not here."""
+def measure(figure: Figure, places: Mapping[str, str]) -> Figure | None:
+    """The figure as its command prints it now; None where its recordings are not here."""
     words = [places.get(word, word) for word in shlex.split(figure.command)]
-    if lacking := [word for word in words if RECORDINGS.fullmatch(word)]:
-        print(f"not measured, without {', '.join(lacking)}: {figure.command}")
-        return figure
+    if any(RECORDINGS.fullmatch(word) for word in words):
+        return None
     return replace(figure, value=value_in(output_of(tuple(words)), figure))
 
 
@@ -75,10 +73,14 @@ def value_in(printed: str, figure: Figure) -> float:
     return float(found.group(1))
 
 
-def told(name: str, before: Card, after: Card) -> None:
-    for old, new in zip(before.figures, after.figures, strict=True):
-        change = "as stated" if old.value == new.value else f"stated {old.value:g}"
-        print(f"{name}: {new.what}: {new.value:g} ({change})", flush=True)
+def told(name: str, stated: Figure, measured: Figure | None) -> Figure:
+    """The figure that holds, after it was printed: the measured one, or the stated one where none was."""
+    if measured is None:
+        print(f"{name}: {stated.what}: not measured, without the recordings of {stated.command}", flush=True)
+        return stated
+    change = "as stated" if stated.value == measured.value else f"stated {stated.value:g}"
+    print(f"{name}: {measured.what}: {measured.value:g} ({change})", flush=True)
+    return measured
 
 
 if __name__ == "__main__":

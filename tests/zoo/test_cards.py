@@ -54,7 +54,7 @@ def test_figures_are_measured_again_and_written_where_that_is_asked_for(shelf):
     differs = measured(shelf, "GIVEN=here")
     assert differs.returncode == 1
     assert "size: 4 (stated 1)" in differs.stdout
-    assert "not measured, without NOT_HERE" in differs.stdout
+    assert "of others: not measured" in differs.stdout
     assert read_card(shelf / "one" / CARD) == stated
     assert measured(shelf, "GIVEN=here", "--write").returncode == 0
     assert [figure.value for figure in read_card(shelf / "one" / CARD).figures] == [4.0, 7.0]
