@@ -65,6 +65,8 @@ def join(folder: Path) -> None:
 
 def compared(rows: dict[str, np.ndarray]) -> None:
     """Which rows are farther off than the best search, clip by clip, Holm over all of them."""
+    if BEST not in rows:
+        return
     others = [name for name in rows if name not in (BEST, "recorded")]
     apart = {name: rows[name][:, 0] - rows[BEST][:, 0] for name in others}
     chances = holm([float(wilcoxon(apart[name]).pvalue) for name in others])

@@ -52,12 +52,7 @@ class Variant:
 
 
 BOTH, PHONE_NET = Variant({"features": "both"}), Variant({"features": "phone_net"})
-LARGEST = Variant(constants={"point_loss.LARGEST": 0.5})
-LARGER = Variant(constants={"point_loss.LARGEST": 1.5})
 LIPS = Variant(constants={"point_loss.LIPS": 12.0})
-SILENT = Variant(constants={"windows.SILENCE_SHARE": 0.7})
-SHIFTED = Variant(constants={"windows.SHIFT": 4.0})
-MIXED = Variant(constants={"windows.MIXED": 0.5})
 NOISY = Variant(constants={"windows.NOISE": 0.3, "windows.LOUDNESS": 0.3, "windows.MASK_SHARE": 0.9})
 TEMPO = Variant(constants={"windows.TEMPO": 0.25})
 DROPPED = Variant({"steps": 1000}, shape={"dropout": 0.35})
@@ -68,24 +63,14 @@ VARIANTS = {
     "base": Variant(),
     "both": BOTH,
     "phone_net": PHONE_NET,
-    "largest": LARGEST,
-    "larger": LARGER,
     "lips": LIPS,
-    "silent": SILENT,
-    "shifted": SHIFTED,
-    "mixed": MIXED,
     "noisy": NOISY,
     "tempo": TEMPO,
     "dropped": DROPPED,
     "longer": LONGER,
     "settled": SETTLED,
     "unseen": UNSEEN,
-    "together": BOTH | LARGEST | SILENT | SETTLED,
-    "together dropped": BOTH | LARGEST | SILENT | SETTLED | DROPPED,
-    "together noisy": BOTH | LARGEST | SILENT | SETTLED | DROPPED | NOISY | MIXED,
-    "together unseen": BOTH | LARGEST | SILENT | SETTLED | UNSEEN,
-    "bands together": LARGEST | SILENT | SETTLED | DROPPED,
-    "bands together unseen": LARGEST | SILENT | SETTLED | DROPPED | UNSEEN,
+    "both dropped": BOTH | DROPPED | SETTLED,
 }
 VARIANTS |= {"sound": Variant({"phones": False})}
 VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in (0, 40, 80, 160, 320)}

@@ -11,10 +11,12 @@ from facesynth.export.phones import phone_net_graph
 from facesynth.export.speech_graphs import log_mel_graph
 from facesynth.graph_builder import Builder
 from facesynth.inference.efase.exported import SOUND
+from facesynth.inference.expectation import EACH
 from facesynth.inference.residual import ARRAYS
 from facesynth.methods.efase.audio import PhoneSound
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
+from facesynth.methods.learn.linear_path import SHARE, SIDE, LinearPath
 from facesynth.methods.learn.pose_network import REACH, CausalBlock
 from facesynth.methods.learn.residual import Residual
 
@@ -24,11 +26,19 @@ def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
     network, reading = predictor.network, predictor.reading
     b = Builder("expectation")
     heard = Port("heard", "float32", ("batch", "frames", reading.width), "standardised", reading.rate)
-    value = b.op("Transpose", b.input(heard.name, heard.dtype, heard.shape), perm=[0, 2, 1])
+    value = b.input(heard.name, heard.dtype, heard.shape)
+    if len(network.columns):
+        value = b.op("Gather", value, b.constant(network.columns.cpu().numpy()), axis=2)
+    value = b.op("Transpose", value, perm=[0, 2, 1])
     value = b.op("Gelu", _causal(b, value, network.first))
     for block in network.blocks.children():
         value = b.op("Add", value, _changed(b, value, block))  # type: ignore[arg-type]  # all of them are CausalBlock
-    poses = b.op("Transpose", _causal(b, value, network.poses), perm=[0, 2, 1])
+    components = _causal(b, value, network.poses)
+    if predictor.linear.learned:
+        own, straight = b.constant(np.float32(1 - SHARE)), b.constant(np.float32(SHARE))
+        linear = _linear(b, heard.name, predictor.linear, predictor.ahead)
+        components = b.op("Add", b.op("Mul", components, own), b.op("Mul", linear, straight))
+    poses = b.op("Transpose", components, perm=[0, 2, 1])
     value = b.op("Add", b.op("MatMul", poses, b.constant(predictor.into.cpu().numpy())), b.constant(predictor.onto.cpu().numpy()))
     port = Port("poses", "float32", ("batch", "frames", len(predictor.onto)), f"coordinates of motion in {unit}", reading.rate)
     b.output(value, port.name, port.dtype, port.shape)
@@ -48,6 +58,17 @@ def hearing_graphs(hearing: Hearing) -> tuple[Graph, ...]:
     """What it hears with."""
     log_mel = () if hearing.features == "phone_net" else (log_mel_graph(hearing.mel),)
     return log_mel + (() if hearing.features == "log_mel" else (phone_net_graph(int(hearing.layer)),))
+
+
+def _linear(b: Builder, heard: str, linear: LinearPath, ahead: int) -> str:
+    """[B, R, T] what a regression says of [B, T, W]; as `LinearPath.forward`."""
+    _, bands, count = linear.weight.shape
+    split = b.op("Reshape", b.span(heard, 2, 0, EACH * bands), b.ints(0, 0, EACH, bands))
+    sound = b.op("Transpose", b.op("ReduceMean", split, b.ints(2), keepdims=0), perm=[0, 2, 1])
+    late = max(ahead - SIDE, 0)
+    padded = b.op("Pad", sound, b.ints(0, 0, count - 1 + late, 0, 0, 0), b.constant(np.float32(0)))
+    weight, bias = (b.constant(part.float().cpu().numpy()) for part in (linear.weight, linear.bias))
+    return b.span(b.op("Conv", padded, weight, bias), 2, 0, -late if late else 2**62)
 
 
 def _changed(b: Builder, value: str, block: CausalBlock) -> str:

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.expectation import RATE, Expectation, Reading, Said, Single, linear_at, rate_of
+from facesynth.inference.expectation import EACH, RATE, Expectation, Reading, Said, Single, linear_at, rate_of
 from facesynth.inference.layout import Layout
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
+from facesynth.methods.learn.linear_path import SHARE, LinearPath
 from facesynth.methods.learn.other_voices import other_voice
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
@@ -80,6 +81,7 @@ class PosePredictor(nn.Module):
         self.hearing = Hearing(features, BANDS)
         self.pca = _no_components()
         self.network = PoseNetwork(1, 1)
+        self.linear = LinearPath()
         for name, start in (("scale", torch.ones(1)), ("into", torch.zeros(0, 0)), ("onto", torch.zeros(0))):
             self.register_buffer(name, start)
         self.register_buffer("metric", torch.ones(0))
@@ -109,9 +111,25 @@ class PosePredictor(nn.Module):
         self.pca = Pca.fit(frames, COMPONENTS).to(device)
         self.scale = self.pca.encode(torch.from_numpy(frames).to(device)).std(dim=0).max().clamp(min=1e-6).reshape(1)
         self.into, self.onto = self.scale * self.pca.basis.T, self.pca.mean.clone()
-        self.network = PoseNetwork(self.reading.width, self.pca.basis.shape[1], seed=seed).to(device)
+        columns = self.read_by_network()
+        inputs = len(columns) or self.reading.width
+        self.network = PoseNetwork(inputs, self.pca.basis.shape[1], seed=seed, columns=columns).to(device)
         recordings = [self.recording(*one, corpus.emotions) for one in zip(corpus, heard, strict=True)]
-        return Windows(recordings, self.reading, self.ahead, self.unsaid)
+        if len(columns):
+            self.linear.learn(recordings, self.reading, self.ahead)
+        return Windows(recordings, self.reading, self.ahead, self.unsaid, BANDS if len(columns) else None)
+
+    def read_by_network(self) -> Tensor:
+        """Columns of what is told that the network reads: all of them (an empty list), or all but the phone network's layer.
+
+        Told of both, it would learn the layer by heart; the regression beside it bears that.
+        """
+        reading = self.reading
+        count = len(reading.standard.mean)
+        if self.hearing.features != "both":
+            return torch.zeros(0, dtype=torch.int64)
+        heard = torch.arange(EACH * count).reshape(EACH, count)[:, :BANDS].flatten()
+        return torch.cat([heard, torch.arange(EACH * count, reading.width)])
 
     def heard(self, corpus: Corpus, seed: int) -> list[list[Bands]]:
         """Features [F, B] of each recording, and of `voices` changed sounds of it."""
@@ -152,7 +170,10 @@ class PosePredictor(nn.Module):
     @torch.no_grad()
     def forward(self, told: Tensor) -> Tensor:
         """[F, W] what the network is told to coordinates [F, D]."""
-        poses: Tensor = self.network(told[None])[0][0] @ self.into + self.onto
+        components = self.network(told[None])[0][0]
+        if self.linear.learned:
+            components = components.lerp(self.linear(told, self.ahead), SHARE)
+        poses: Tensor = components @ self.into + self.onto
         return poses
 
     def expectation(self) -> Expectation:

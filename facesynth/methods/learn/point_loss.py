@@ -9,8 +9,6 @@ from facesynth.methods.learn.windows import Batch
 
 LIPS = 4.0
 """How much a lip point counts beside another one."""
-LARGEST = 0.0
-"""How much the lip point that is farthest off counts beside all points."""
 MOST_OTHERS = 64
 """Points beside the lips that are looked at; of more, evenly spread ones tell enough."""
 ROUND = 0.01
@@ -47,7 +45,7 @@ class PointLoss(nn.Module):
         weights = np.concatenate([np.full(len(lips), LIPS), np.full(len(some), len(others) / max(len(some), 1))])
         points = np.concatenate([np.array(lips), some]).astype(np.int64)
         columns = (points[:, None] * layout.dimension + np.arange(layout.dimension)).ravel()
-        self.dimension, self.lips, self.rounding = layout.dimension, len(lips), (ROUND * size) ** 2
+        self.dimension, self.rounding = layout.dimension, (ROUND * size) ** 2
         self.register_buffer("basis", basis[torch.from_numpy(columns).to(basis.device)].T.contiguous())
         self.register_buffer("weights", torch.from_numpy(weights / weights.mean()).to(basis))
 
@@ -58,22 +56,15 @@ class PointLoss(nn.Module):
         missed = predicted - batch.poses
         apart = (missed @ self.basis).reshape(*missed.shape[:2], -1, self.dimension)  # [B, F, points, dimension]
         both = batch.present[:, 1:] * batch.present[:, :-1]
-        distances = self._distances(apart)
-        near = _mean((distances * self.weights).mean(dim=-1), batch.present)
-        near = near + LARGEST * _mean(distances[..., : self.lips].amax(dim=-1), batch.present)
-        alike = _mean((self._distances(apart.diff(dim=1)) * self.weights).mean(dim=-1), both)
-        return near + alike + self._surprise(missed.detach(), log_deviations, batch.present)
+        near = self._mean_distance(apart, batch.present) + self._mean_distance(apart.diff(dim=1), both)
+        return near + self._surprise(missed.detach(), log_deviations, batch.present)
 
-    def _distances(self, apart: Tensor) -> Tensor:
-        return (apart.square().sum(dim=-1) + self.rounding).sqrt()
+    def _mean_distance(self, apart: Tensor, present: Tensor) -> Tensor:
+        distances = (apart.square().sum(dim=-1) + self.rounding).sqrt()
+        return ((distances * self.weights).mean(dim=-1) * present).sum() / present.sum().clamp(min=1)
 
     def _surprise(self, missed: Tensor, log_deviations: Tensor, present: Tensor) -> Tensor:
         """-log of the normal density of what was missed, without its constant, mean over components."""
         held = log_deviations.clamp(DEEPEST, SHALLOWEST)
         each = held + 0.5 * missed.square() * torch.exp(-2 * held)
-        return _mean(each.mean(dim=-1), present)
-
-
-def _mean(each: Tensor, present: Tensor) -> Tensor:
-    """Over the frames that were recorded."""
-    return (each * present).sum() / present.sum().clamp(min=1)
+        return (each.mean(dim=-1) * present).sum() / present.sum().clamp(min=1)

@@ -37,9 +37,15 @@ class PoseNetwork(nn.Module):
     The deviations are read off the same layers and send nothing back through them: whoever leaves them out loses nothing.
     """
 
-    def __init__(self, inputs: int, outputs: int, *, width: int = 128, dropout: float = 0.2, seed: int = 0) -> None:
+    columns: Tensor
+    """[inputs] of what is told, those that are read; none for all."""
+
+    def __init__(
+        self, inputs: int, outputs: int, *, width: int = 128, dropout: float = 0.2, seed: int = 0, columns: Tensor | None = None
+    ) -> None:
         """seed: of the first weights; torch's own generator stays as it was."""
         super().__init__()
+        self.register_buffer("columns", torch.zeros(0, dtype=torch.int64) if columns is None else columns)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.dropout = nn.Dropout(dropout)
@@ -50,7 +56,8 @@ class PoseNetwork(nn.Module):
 
     def forward(self, told: Tensor) -> tuple[Tensor, Tensor]:
         """Components and logarithms of deviations, both [B, F, outputs]."""
-        heard = functional.pad(self.dropout(told).transpose(1, 2), (KERNEL - 1, 0))
+        read = told[..., self.columns] if len(self.columns) else told
+        heard = functional.pad(self.dropout(read).transpose(1, 2), (KERNEL - 1, 0))
         deep = self.dropout(self.blocks(functional.gelu(self.first(heard))))
         return self.poses(deep).transpose(1, 2), self.log_deviations(deep.detach()).transpose(1, 2)
 

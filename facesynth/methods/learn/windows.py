@@ -19,12 +19,6 @@ LOUDNESS, NOISE = 0.15, 0.1
 """Deviation of a window's gain and of noise in its bands, in deviations of the bands."""
 MASKED, MASK_SHARE = 8, 0.5
 """Of the 64 bands so many neighbours fall silent, in this share of the windows."""
-SILENCED, SILENCE_SHARE = 8, 0.0
-"""Frames of the sound in a row that fall silent, in this share of the windows."""
-SHIFT = 0.0
-"""Bands by which the spectrum is moved up or down, at most: as longer and shorter vocal tracts do."""
-MIXED = 0.0
-"""Windows are mixed with another one of the batch, sound and motion, by up to this share."""
 TEMPO = 0.1
 """Windows are said so much faster or slower at most."""
 
@@ -70,8 +64,14 @@ class Batch(NamedTuple):
 class Windows:
     """Draws batches of windows of recordings, longer ones more often."""
 
-    def __init__(self, recordings: Sequence[Recording], reading: Reading, ahead: int, unsaid: float = 0.0) -> None:
-        """unsaid: in this share of the windows the network is not told what is said, and must hear it."""
+    def __init__(
+        self, recordings: Sequence[Recording], reading: Reading, ahead: int, unsaid: float = 0.0, disturbed: int | None = None
+    ) -> None:
+        """unsaid: in this share of the windows the network is not told what is said, and must hear it.
+
+        disturbed: of the bands, how many are changed; all unless told.
+        """
+        self.disturbed = disturbed
         self.recordings, self.reading, self.ahead, self.unsaid = recordings, reading, ahead, unsaid
         lengths = np.array([recording.duration_s for recording in recordings])
         self.shares = lengths / lengths.sum()
@@ -80,7 +80,7 @@ class Windows:
         """BATCH windows."""
         chosen = rng.choice(len(self.recordings), BATCH, p=self.shares)
         windows = [self._window(self.recordings[i], rng) for i in chosen]
-        return _mixed(Batch(*(torch.from_numpy(np.stack(column)) for column in zip(*windows, strict=True))), rng)
+        return Batch(*(torch.from_numpy(np.stack(column)) for column in zip(*windows, strict=True)))
 
     def _window(self, recording: Recording, rng: np.random.Generator) -> tuple[Single, Single, Single]:
         """Sound and motion of a stretch that is said a little faster or slower."""
@@ -99,37 +99,13 @@ class Windows:
     def _disturbed(self, heard: Single, rng: np.random.Generator) -> Single:
         """Bands [F, EACH B] louder or softer, noisy, and some of them silent."""
         bands = heard.reshape(len(heard), EACH, -1)
-        if SHIFT:
-            bands = _shifted(bands, rng.uniform(-SHIFT, SHIFT))
+        bands, others = np.split(bands, [bands.shape[2] if self.disturbed is None else self.disturbed], axis=2)
         changed = bands + LOUDNESS * rng.standard_normal() + NOISE * rng.standard_normal(bands.shape, np.float32)
         width = max(1, round(MASKED / 64 * bands.shape[2]))
         if rng.random() < MASK_SHARE:
             low = int(rng.integers(bands.shape[2] - width + 1))
             changed[:, :, low : low + width] = 0
-        if rng.random() < SILENCE_SHARE:
-            first = int(rng.integers(len(changed)))
-            changed[first : first + SILENCED] = 0
-        return np.asarray(changed.reshape(heard.shape), np.float32)
-
-
-def _shifted(bands: Single, by: float) -> Single:
-    """Of bands [F, EACH, B] the first 64 moved by some bands, linear between them, held at the ends."""
-    count = min(64, bands.shape[2])
-    at = np.clip(np.arange(count) + by, 0, count - 1)
-    low = np.minimum(at.astype(np.int64), count - 2)
-    share = (at - low).astype(np.float32)
-    moved = bands.copy()
-    moved[:, :, :count] = bands[:, :, low] * (1 - share) + bands[:, :, low + 1] * share
-    return moved
-
-
-def _mixed(batch: Batch, rng: np.random.Generator) -> Batch:
-    """Each window with a share of the one before it in the batch, in sound and motion alike."""
-    if not MIXED:
-        return batch
-    share = torch.from_numpy(rng.uniform(0, MIXED, (len(batch.told), 1, 1)).astype(np.float32))
-    told, poses = (part + share * (part.roll(1, 0) - part) for part in (batch.told, batch.poses))
-    return Batch(told, poses, batch.present * batch.present.roll(1, 0))
+        return np.asarray(np.concatenate([changed, others], axis=2).reshape(heard.shape), np.float32)
 
 
 def _any_bands(recording: Recording, rng: np.random.Generator) -> NDArray[Any]:

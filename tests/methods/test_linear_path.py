@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+import torch
+
+from facesynth.inference.expectation import Reading, Said, Standard
+from facesynth.methods.learn.linear_path import SIDE, LinearPath
+from facesynth.methods.learn.windows import Recording
+
+RNG = np.random.default_rng(5)
+BANDS, FPS = 4, 25.0
+READING = Reading(Standard(np.zeros(BANDS, np.float32), np.ones(BANDS, np.float32)), FPS, False, 1)
+SAID = Said.numbered([0], np.array([np.inf]), [0], 1)
+
+
+def recording(weights, offset, present=1.0):
+    """Poses that are a linear map of the sound `offset` frames from them."""
+    bands = RNG.normal(size=(400, BANDS)).astype(np.float32)
+    told = READING.told(bands, SAID, (np.arange(100) + offset) / FPS).reshape(100, -1, BANDS).mean(axis=1)
+    return Recording(bands, SAID, (told @ weights + 1).astype(np.float32), np.full(100, present, np.float32), FPS)
+
+
+@pytest.mark.parametrize(("offset", "ahead"), [(0, 0), (-3, 2), (2, 2), (4, 18)])
+def test_poses_that_are_linear_in_the_sound_are_found_whatever_may_be_looked_ahead(offset, ahead):
+    weights = RNG.normal(size=(BANDS, 3)).astype(np.float32)
+    some, path = [recording(weights, offset) for _ in range(6)], LinearPath()
+    path.learn(some, READING, ahead)
+    told = READING.told(some[0].bands, SAID, np.arange(100 + ahead) / FPS)
+    found = path(torch.from_numpy(told), ahead)[ahead:].numpy()  # the input runs ahead
+    inside = slice(2 * SIDE, -2 * SIDE)
+    np.testing.assert_allclose(found[inside], some[0].poses[inside], atol=0.1)
+
+
+def test_frames_that_were_not_recorded_teach_nothing():
+    weights = RNG.normal(size=(BANDS, 2)).astype(np.float32)
+    one, two = LinearPath(), LinearPath()
+    some = [recording(weights, 0) for _ in range(4)]
+    one.learn(some, READING, 3)
+    broken = recording(-9 * weights, 0, present=0.0)
+    two.learn([*some, broken], READING, 3)
+    assert torch.equal(one.weight, two.weight)
+
+
+def test_it_says_nothing_before_it_has_learned():
+    assert not LinearPath().learned
