@@ -16,7 +16,7 @@ def recording(weights, offset, present=1.0):
     """Poses that are a linear map of the sound `offset` frames from them."""
     bands = RNG.normal(size=(400, BANDS)).astype(np.float32)
     told = READING.told(bands, SAID, (np.arange(100) + offset) / FPS).reshape(100, -1, BANDS).mean(axis=1)
-    return Recording(bands, SAID, (told @ weights + 1).astype(np.float32), np.full(100, present, np.float32), FPS)
+    return Recording(bands, (), SAID, (told @ weights + 1).astype(np.float32), np.full(100, present, np.float32), FPS)
 
 
 @pytest.mark.parametrize(("offset", "ahead"), [(0, 0), (-3, 2), (2, 2), (4, 18)])

@@ -8,7 +8,7 @@ from corpora import tiny_corpus, tiny_layout
 import facesynth
 from facesynth.export.models import export_model
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.expectation import rate_of
+from facesynth.inference.expectation import EACH, rate_of
 from facesynth.inference.filters import cubic_at
 from facesynth.inference.loading import load as load_folder
 from facesynth.inference.sound import resample
@@ -145,6 +145,25 @@ def test_saved_and_exported_it_speaks_the_same_in_under_three_megabytes(by_sound
     stream = exported.stream(emotion=speech.emotions.labels[0])
     frames = np.concatenate([stream.push(resample(speech.audio, speech.sample_rate, 16000)), stream.finish()])
     np.testing.assert_allclose(frames[: len(wanted)], wanted[: len(frames)], atol=1e-4 * np.abs(wanted).max())
+
+
+def test_told_of_both_the_regression_hears_the_phone_network_and_the_network_does_not(halves, tmp_path):
+    few = halves[0].subset(halves[0].ids[:4])
+    model = Network(steps=2, features="both").fit(few)
+    predictor, speech = model.predictor, halves[1][halves[1].ids[0]].speech
+    reading = predictor.reading
+    told = torch.from_numpy(RNG.normal(size=(60, reading.width)).astype(np.float32))
+    changed = told.clone()
+    changed[:, : EACH * 208].view(60, EACH, 208)[:, :, 64:] += 1
+    assert torch.equal(predictor.network(told[None])[0], predictor.network(changed[None])[0])
+    assert not torch.allclose(predictor(told), predictor(changed))
+    model.save(tmp_path / "both.safetensors")
+    assert (tmp_path / "both.safetensors").stat().st_size < 3e6
+    wanted = load(tmp_path / "both.safetensors").synthesize(speech).frames
+    assert np.array_equal(wanted, model.synthesize(speech).frames)
+    export_model(tmp_path / "both.safetensors", tmp_path / "folder")
+    exported = load_folder(tmp_path / "folder").synthesize(speech).frames
+    np.testing.assert_allclose(exported, wanted, atol=2e-3 * np.abs(wanted).max())
 
 
 def test_lips_count_four_times_and_missing_frames_not_at_all():
