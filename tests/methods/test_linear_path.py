@@ -4,6 +4,7 @@ import torch
 
 from facesynth.inference.expectation import Reading, Said, Standard
 from facesynth.methods.learn.linear_path import SIDE, LinearPath
+from facesynth.methods.learn.regression import Moments
 from facesynth.methods.learn.windows import Recording
 
 RNG = np.random.default_rng(5)
@@ -42,3 +43,10 @@ def test_frames_that_were_not_recorded_teach_nothing():
 
 def test_it_says_nothing_before_it_has_learned():
     assert not LinearPath().learned
+
+
+def test_one_penalty_is_solved_as_all_of_them_are():
+    sums, x = Moments.zero(5, 2), RNG.normal(size=(40, 5))
+    sums.add(x, x @ RNG.normal(size=(5, 2)) + 3)
+    for one, other in zip(sums.solution(0.1), sums.solutions([0.1])[0], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-10)

@@ -15,7 +15,7 @@ from facesynth.inference.expectation import EACH, Reading
 from facesynth.methods.learn.regression import Moments
 from facesynth.methods.learn.windows import Recording
 
-SHARE = 0.3
+SHARE = 0.4
 """How much of the pose is the regression's; the network's is the rest."""
 SIDE = 5
 """Frames of the sound on either side of a frame that are heard, as far as may be looked ahead."""
@@ -61,7 +61,7 @@ class LinearPath(nn.Module):
             heard, poses = _samples(recording, reading, offsets)
             parts[number % CHOOSING == 0 and len(recordings) > 1].add(heard, poses)
         errors = [parts[1].error(*solution) for solution in parts[0].solutions(PENALTIES)] if parts[1].count else [0.0]
-        weights, bias = (parts[0] + parts[1]).solutions([PENALTIES[int(np.argmin(errors))]])[0]
+        weights, bias = (parts[0] + parts[1]).solution(PENALTIES[int(np.argmin(errors))])
         shaped = weights.reshape(len(offsets), bands, -1).transpose(2, 1, 0)
         self.weight = torch.from_numpy(np.ascontiguousarray(shaped)).to(self.weight)
         self.bias = torch.from_numpy(bias).to(self.bias)

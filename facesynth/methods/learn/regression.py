@@ -45,6 +45,14 @@ class Moments:
         weights = [directions @ (along / (variance.clip(min=0) + alpha * scale)[:, None]) for alpha in alphas]
         return [(w, y - x @ w) for w in weights]
 
+    def solution(self, alpha: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The same for one penalty above 0, a tenth of the work."""
+        x, y = self.x / self.count, self.y / self.count
+        spread = self.xx / self.count - np.outer(x, x)
+        penalty = alpha * np.trace(spread) / len(spread)
+        weights = np.linalg.solve(spread + penalty * np.eye(len(spread)), self.xy / self.count - np.outer(x, y))
+        return weights, y - x @ weights
+
     def error(self, weights: NDArray[np.float64], bias: NDArray[np.float64]) -> float:
         """Mean over the samples of ‖x W + b - y‖²."""
         predicted = np.sum(weights * (self.xx @ weights)) + 2 * self.x @ weights @ bias + self.count * bias @ bias

@@ -25,14 +25,21 @@ def matching_share(pairs: Iterable[tuple[Motion, Motion]], points: Sequence[int]
 def _speed_ratios(made: Motion, truth: Motion, points: Sequence[int] | None) -> Floats:
     """[S] mean speed of a motion sharpened by each of SHARES over that of the recording."""
     count, fps = min(len(made), len(truth)), truth.fps
-    recorded = _speeds(truth, without_roughness(truth.frames[:count].astype(np.float64), fps), points)
+    mine, theirs = (_some(motion, count, points) for motion in (made, truth))
+    recorded = _speeds(without_roughness(theirs, fps), truth)
     present = np.isfinite(recorded)
-    sharp = [sharpen(made.frames[:count].astype(np.float64), share, fps) for share in SHARES]
-    made_speeds = [_speeds(made, without_roughness(frames, fps), points)[present].mean() for frames in sharp]
+    sharp = [sharpen(mine, share, fps) for share in SHARES]
+    made_speeds = [_speeds(without_roughness(frames, fps), made)[present].mean() for frames in sharp]
     return np.array(made_speeds) / max(recorded[present].mean(), 1e-12)
 
 
-def _speeds(motion: Motion, frames: Floats, points: Sequence[int] | None) -> Floats:
-    """[T - 1, K] how far each of some points of a motion's layout, or all, goes from frame to frame."""
-    some = motion.layout.points(frames)[:, slice(None) if points is None else list(points)]
-    return np.asarray(np.linalg.norm(np.diff(some, axis=0), axis=2))
+def _some(motion: Motion, count: int, points: Sequence[int] | None) -> Floats:
+    """[T, K dimension] the first frames of some points of a motion, or of all."""
+    some = motion.layout.points(motion.frames[:count].astype(np.float64))[:, slice(None) if points is None else list(points)]
+    return np.asarray(some.reshape(count, -1))
+
+
+def _speeds(frames: Floats, motion: Motion) -> Floats:
+    """[T - 1, K] how far each point goes from frame to frame."""
+    by_point = frames.reshape(len(frames), -1, motion.layout.dimension)
+    return np.asarray(np.linalg.norm(np.diff(by_point, axis=0), axis=2))
