@@ -41,7 +41,8 @@ def said_words(corpus: Corpus, utterance_id: str) -> list[SaidWord]:
     """Words of an utterance as its TextGrid has them, in lower case; "" beside the first and the last."""
     words = read_textgrid(corpus.files.phones(utterance_id))[1]
     labels = ["", *(label.lower() for label, _, _ in words), ""]
-    return [SaidWord(utterance_id, *labels[k : k + 3], start, end) for k, (_, start, end) in enumerate(words)]
+    between = zip(labels[:-2], labels[1:-1], labels[2:], words, strict=True)
+    return [SaidWord(utterance_id, before, word, after, start, end) for before, word, after, (_, start, end) in between]
 
 
 def same_words(

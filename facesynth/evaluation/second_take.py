@@ -42,8 +42,8 @@ def spans(phones: PhoneTrack) -> list[Span]:
 
 def matching_times(phones: Sequence[Span], theirs: Sequence[Span]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times (s) in both at which a common phone starts or ends, with the start and the end of both."""
-    labels = [[label for label, _, _ in some] for some in (phones, theirs)]
-    runs = SequenceMatcher(None, *labels, autojunk=False).get_matching_blocks()
+    mine, others = ([label for label, _, _ in some] for some in (phones, theirs))
+    runs = SequenceMatcher(None, mine, others, autojunk=False).get_matching_blocks()
     pairs = {(phones[0][1], theirs[0][1]), (phones[-1][2], theirs[-1][2])}
     for run in runs:
         for i, j in zip(range(run.a, run.a + run.size), range(run.b, run.b + run.size), strict=True):
