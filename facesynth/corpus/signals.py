@@ -129,8 +129,11 @@ def hash_signals(audio: NDArray[np.float32], sample_rate: int, motion: Motion) -
     """sha256 of the sound and the motion of a recording, whatever is said of it."""
     digest = hashlib.sha256(f"{sample_rate} {motion.fps:.6f}".encode())
     for array in (audio, motion.frames, motion.head, motion.eyes):
-        digest.update(b"none" if array is None else str(array.shape).encode())
-        for rows in () if array is None else row_blocks(array):
+        if array is None:
+            digest.update(b"none")
+            continue
+        digest.update(str(array.shape).encode())
+        for rows in row_blocks(array):
             digest.update(np.ascontiguousarray(array[rows]).tobytes())
     return digest.hexdigest()
 

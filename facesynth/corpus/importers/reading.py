@@ -83,7 +83,7 @@ def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
 
 def open_gaps(points: NDArray[np.floating]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
     """Markers [T, K, 3] with NaN where programs wrote a number for a gap, and what is said of it."""
-    unseen = filled_in(points) & ~by_blocks(lambda some: np.isnan(some).any(axis=2), points, bool)
+    unseen = filled_in(points) & ~by_blocks(lambda some: np.asarray(np.isnan(some).any(axis=2)), points, bool)
     if not unseen.any():
         return points, ()
     said = f"{np.count_nonzero(unseen)} samples are 0, 0, 0 or far from the face, as programs write gaps: they are gaps"

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.long_arrays import all_finite, let_go
-from facesynth.speech.audio import resample
+from facesynth.inference.sound import resample
 
 if TYPE_CHECKING:
     import av.container
