@@ -15,7 +15,7 @@ from facesynth.evaluation.geometry import lve, marker_error
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
-from facesynth.methods.anime_graph.report import MapTrial
+from facesynth.methods.anime_graph.report import MapTrial, learner
 from facesynth.methods.training import train
 
 CONFIG = Path(__file__).parents[1] / "configs" / "anime_graph.yaml"
@@ -38,7 +38,11 @@ def main() -> None:
     print(f"{len(learn)} utterances, {len(model.graph)} nodes, {model.components.count} components")
     for row, cutoff_hz in zip(model.facts["components"], model.cutoffs_hz.tolist(), strict=False):
         print(f"  component {row['component']:2d} ({row['block']}): {row['is']}, emotion ratio {row['emotion_ratio']:.2f}, "
+              f"false discovery {row['false_discovery']:.3f}, "
               f"mouth share {row['mouth_share']:.3f}, cut-off {cutoff_hz:.1f} Hz")  # fmt: skip
+
+    for sentence in model.facts["findings"]:
+        print(sentence)
 
     # evaluate: sentences it has not seen
     unit = corpus.layout.unit
@@ -64,7 +68,8 @@ def _lips(made, truth) -> str:  # type: ignore[no-untyped-def]
 def report_maps(model: AnimeGraph, corpus: Corpus, most: int) -> None:
     """Unit-cube RMS of every ordered pair, and how it falls with the number of parallel sentences."""
     takes = [take for take in (take_of(u, model.components) for u in corpus) if take is not None]
-    trial = MapTrial(takes, model.split, model.components, corpus.layout, model.map_settings.centres)
+    learn = learner(corpus.layout, variance=model.config["variance"], override=model.config["emotional_components"])
+    trial = MapTrial(takes, corpus.layout, learn, model.map_settings.centres)
     few = trial.with_sentences(most)
     default = f"{model.map_settings.kernel} {model.map_settings.width}"
     for source, target in permutations(corpus.emotions, 2):

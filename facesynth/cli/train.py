@@ -105,6 +105,8 @@ def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | No
     if moved := model.facts.get("repaired"):
         moduli = ", ".join(f"{modulus:.3f}" for modulus in moved)
         click.echo(f"unstable: eigenvalues of modulus {moduli} were moved inside, the rest refitted")
+    for sentence in model.facts.get("findings", ()):
+        click.echo(sentence)
     if face:
         click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
     click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')

@@ -69,8 +69,7 @@ def emotion_maps_graph(maps: EmotionMaps, fps: float) -> Graph:
     moved = b.op("MatMul", b.op("Exp", b.op("Neg", exponent)), coefficients)
     spread = np.zeros((len(emotional), width))
     spread[np.arange(len(emotional)), emotional] = 1.0
-    lasting = of_map(np.where(np.isin(np.arange(width), emotional), 0.0, maps.shifts.numpy()))
-    change = b.op("Add", b.op("MatMul", moved, b.constant(spread)), lasting)
+    change = b.op("Add", b.op("MatMul", moved, b.constant(spread)), of_map(maps.shifts.numpy()))
     mapped = b.op("Add", x, b.op("Mul", b.op("Unsqueeze", intensity, b.ints(-1)), change))
     port = Port("mapped", "float64", ("batch", "frames", width), "components", fps)
     b.output(mapped, port.name, port.dtype, port.shape)

@@ -14,7 +14,7 @@ from facesynth.inference.speech import EmotionTrack
 from facesynth.methods.anime_graph.mapping import MapSettings, Samples, fit_map
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import aligned, emotion_pairs, retakes, take_of
-from facesynth.methods.anime_graph.report import MapTrial, unit_cube_rms
+from facesynth.methods.anime_graph.report import MapTrial, learner, unit_cube_rms
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_the_papers_width_leaves_unseen_places_almost_unchanged():
 
 
 def test_mapping_beats_doing_nothing_on_sentences_left_out(model, takes, corpus):
-    trial = MapTrial(takes, model.split, model.components, corpus.layout, centres=40)
+    trial = MapTrial(takes, corpus.layout, learner(corpus.layout, variance=0.98), centres=40)
     score = trial.score("neutral", "happy", folds=2)
     assert score.sentences >= 4
     assert score.mapped["exponential cross-validated"] < 0.6 * score.unchanged

@@ -11,7 +11,7 @@ from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.methods.anime_graph.lowpass import energy_spectrum
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
-from facesynth.methods.anime_graph.report import MapTrial
+from facesynth.methods.anime_graph.report import MapTrial, learner
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +29,7 @@ def model(split):
 
 def test_maps_come_nearer_than_nothing_and_than_the_mean_difference(performer, model):
     takes = [take for take in (take_of(u, model.components) for u in performer) if take is not None]
-    trial = MapTrial(takes, model.split, model.components, performer.layout)
+    trial = MapTrial(takes, performer.layout, learner(performer.layout, variance=0.98))
     for pair in permutations(performer.emotions, 2):
         score = trial.score(*pair, folds=5)
         assert score.sentences >= 15

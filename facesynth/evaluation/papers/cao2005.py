@@ -17,7 +17,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.anime_graph.parallel import take_of
-from facesynth.methods.anime_graph.report import MapTrial
+from facesynth.methods.anime_graph.report import MapTrial, learner
 from facesynth.methods.emotion.clips import clips_of_corpus
 from facesynth.methods.emotion.tables import COEFFICIENTS, Recognition, Split, table_one
 
@@ -74,7 +74,7 @@ def mapping(material: Material) -> list[Finding]:
     """§5.2: neutral to happy, each sentence left out in turn or in ten groups; by kernel and width."""
     model, layout = learned(material), material.corpus.layout
     takes = [take for u in material.train if (take := take_of(u, model.components)) is not None]
-    trial = MapTrial(takes, model.split, model.components, layout)
+    trial = MapTrial(takes, layout, learner(layout, variance=model.config["variance"], seed=material.seed))
     score = trial.score(*PAIR, seed=material.seed)
     why = f"one sentence there, mean of {score.sentences} here; {material.unlike}; what doing nothing scores is not said there"
     rows = {"unchanged motion": score.unchanged, "mean difference": score.mean_difference, **score.mapped}

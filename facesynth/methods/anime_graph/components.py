@@ -15,6 +15,8 @@ from facesynth.motion.pca import Pca
 UPPER_GROUPS = ("brows", "eyelids", "upper_face", "forehead", "rigid")
 """Layout groups that move with the upper face; everything else moves with the lips and the jaw."""
 BLOCKS = ("lips", "upper face")
+MOST_FRAMES = 60_000
+"""Of more frames than this, evenly spaced ones are enough to find the components."""
 
 
 class FaceComponents(nn.Module):
@@ -40,6 +42,7 @@ class FaceComponents(nn.Module):
 
     def fit(self, frames: NDArray[Any], layout: Layout, *, variance: float, seed: int) -> "FaceComponents":
         """Learn from complete frames [N, C]; `variance` is the share that PCA keeps in each block."""
+        frames = frames[:: max(1, len(frames) // MOST_FRAMES)]
         mean = np.asarray(frames, np.float64).mean(axis=0)
         parts = [(number, columns) for number, columns in enumerate(block_columns(layout)) if _moves(frames, columns)]
         if not parts:
@@ -51,13 +54,14 @@ class FaceComponents(nn.Module):
             mixing[columns, at : at + part.shape[1]] = part
             at += part.shape[1]
         blocks = np.concatenate([np.full(m.shape[1], number) for (number, _), m in zip(parts, mixings, strict=True)])
-        self._keep(mean, mixing, blocks)
+        self.keep(mean, mixing, blocks)
         residual = frames - self.decode_array(self.encode_array(frames))
         share = 1.0 - np.square(residual).sum() / np.square(frames - mean).sum()
         self.register_buffer("captured_share", torch.tensor(share, dtype=torch.float64))
         return self
 
-    def _keep(self, mean: NDArray[np.float64], mixing: NDArray[np.float64], blocks: NDArray[np.int64]) -> None:
+    def keep(self, mean: NDArray[np.float64], mixing: NDArray[np.float64], blocks: NDArray[np.int64]) -> None:
+        """Take components as they are: mean [C], mixing [C, D], and the block of each [D]."""
         orthonormal, triangle = np.linalg.qr(mixing)
         analysis = np.linalg.solve(triangle, orthonormal.T)
         arrays = {"mean": mean, "mixing": mixing, "analysis": analysis, "metric": triangle.T / np.sqrt(len(mean))}

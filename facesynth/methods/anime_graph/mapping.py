@@ -1,18 +1,17 @@
 """Learning emotion maps from parallel sentences (Cao 2005, §5.2)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Literal
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
+from facesynth.methods.anime_graph.parallel import Take, aligned
 from facesynth.methods.anime_graph.split import Split
 from facesynth.motion.rbf import KERNELS, Kernel, RbfMap, closest_distance, cluster_means, median_distance
 
@@ -24,7 +23,7 @@ MOST_SAMPLES = 6000
 """Neighbouring frames repeat each other: of more aligned frames than this, evenly spaced ones are clustered."""
 WIDTH_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Widths that cross-validation tries, in median distances of the centres."""
-RIDGES = (1e-6, 1e-3, 1e-1)
+RIDGES = (1e-6, 1e-3, 1e-1, 10.0)
 """Ridges that it tries with each: recordings of one sentence differ from take to take, which is noise to a map."""
 FOLDS = 4
 
@@ -61,9 +60,9 @@ class Samples:
     sentence: str
 
 
-def matched(takes: Sequence[Take], split: Split, source: str, target: str) -> list[Samples]:
-    """Matched emotional components of every parallel sentence; aligned by the speech components alone."""
-    return [_matched(a, b, split) for a, b in emotion_pairs(takes, source, target)]
+def matched(pairs: Sequence[tuple[Take, Take]], split: Split) -> list[Samples]:
+    """Matched emotional components of pairs of takes; aligned by the speech components alone."""
+    return [_matched(a, b, split) for a, b in pairs]
 
 
 def _matched(a: Take, b: Take, split: Split) -> Samples:
@@ -76,15 +75,20 @@ def _matched(a: Take, b: Take, split: Split) -> Samples:
 
 def require_pairs(split: Split, sentences: int, source: str, target: str) -> None:
     """FacesynthError where a map from one emotion to another cannot be learned."""
+    require_sentences(sentences, source, target)
+    if not len(split.emotional):
+        raise FacesynthError(
+            f"mapping {source} to {target} is impossible: no component of this corpus' motion changes with emotion more than "
+            "chance would have it; name some with `emotional_components`"
+        )
+
+
+def require_sentences(sentences: int, source: str, target: str) -> None:
+    """FacesynthError where too few sentences were recorded in both emotions."""
     if sentences < FEWEST_SENTENCES:
         raise FacesynthError(
             f"mapping {source} to {target} needs at least {FEWEST_SENTENCES} sentences recorded in both (ten are good); "
             f"the corpus has {sentences}"
-        )
-    if not len(split.emotional):
-        raise FacesynthError(
-            f"mapping {source} to {target} is impossible: no component of this corpus' motion changes with emotion; "
-            "name some with `emotional_components`"
         )
 
 
@@ -135,15 +139,27 @@ class MapLearner:
         return folds
 
 
-def lasting_shift(samples: Sequence[Samples], emotional: NDArray[np.int64]) -> Floats:
-    """[D] by how much an emotion shifts the components that no map changes, on average; 0 for those that one does.
+def lasting_shift(samples: Sequence[Samples], split: Split) -> Floats:
+    """[D] by how much an emotion shifts the components on average; 0 for those that a map changes instead.
 
     The paper copies the speech components. Emotions shift them a little all the same (a smile widens the mouth in
-    every vowel), and copying them lost to adding the mean difference of two emotions.
+    every vowel), and copying them lost to adding the mean difference of two emotions. Where speech and emotion are mixed,
+    all components are shifted, and the map adds what depends on the pose.
     """
     shift = _average(samples, "shift")
-    shift[emotional] = 0.0
+    if not split.mixed:
+        shift[split.emotional] = 0.0
     return shift
+
+
+def beside_shift(samples: Sequence[Samples], split: Split) -> Sequence[Samples]:
+    """What a map is to learn beside the lasting shift: everything, or where components are mixed, what is left of the
+    difference after the shift, each component's by its weight.
+    """
+    if not split.mixed:
+        return samples
+    shift = lasting_shift(samples, split)[split.emotional]
+    return [replace(s, target=s.source + split.weights * (s.target - s.source - shift)) for s in samples]
 
 
 def dropped_shift(samples: Sequence[Samples], mixing: Floats) -> Floats:

@@ -21,7 +21,7 @@ class FittedMap:
     rbf: RbfMap
     """Displacement of the emotional components."""
     shifts: NDArray[np.float64]
-    """[D] lasting shift of the other components."""
+    """[D] lasting shift of the other components; of all, where emotion and speech are mixed in them."""
     dropped: NDArray[np.float64]
     """[C] lasting shift of what the components do not hold."""
 
@@ -43,7 +43,7 @@ class EmotionMaps(nn.Module):
     """[M] whether phi(z) is exp(-z²) or exp(-z)."""
 
     shifts: Tensor
-    """[M, D] what a map adds to every frame: the lasting shift of the other components, 0 for the emotional ones."""
+    """[M, D] what a map adds to every frame, beside what depends on the pose: `FittedMap.shifts`."""
 
     dropped: Tensor
     """[M, C] what it adds to every frame outside the components."""
@@ -84,7 +84,7 @@ class EmotionMaps(nn.Module):
     def forward(self, components: Tensor, number: int, intensity: Tensor | float = 1.0) -> Tensor:
         """Components [..., D] in the map's first emotion to [..., D] in its second; intensity [...] 0 leaves them."""
         change = self.shifts[number].expand(components.shape).clone()
-        change[..., self.emotional] = self.rbf(number)(components[..., self.emotional])
+        change[..., self.emotional] += self.rbf(number)(components[..., self.emotional])
         return components + torch.as_tensor(intensity, dtype=components.dtype)[..., None] * change
 
     def apply_array(self, components: NDArray[np.float64], number: int) -> NDArray[np.float64]:

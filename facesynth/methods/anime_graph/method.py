@@ -34,6 +34,7 @@ from facesynth.methods.anime_graph.mapping import (
     MapSettings,
     Samples,
     Width,
+    beside_shift,
     dropped_shift,
     fit_map,
     lasting_shift,
@@ -51,9 +52,6 @@ from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.rbf import Kernel
 from facesynth.progress import track
-
-MOST_FRAMES = 60_000
-"""Of more training frames than this, evenly spaced ones are enough to find the components."""
 
 
 @register(CAPABILITIES)
@@ -148,8 +146,7 @@ class AnimeGraph(Method):
         frames = frames[np.isfinite(frames).all(axis=1)]
         if len(frames) < 2:
             raise FacesynthError(f"{corpus.path} has {len(frames)} complete frames of motion; there is nothing to learn from")
-        some = frames[:: max(1, len(frames) // MOST_FRAMES)]
-        self.components.fit(some, corpus.layout, variance=self.config["variance"], seed=seed)
+        self.components.fit(frames, corpus.layout, variance=self.config["variance"], seed=seed)
         builder = GraphBuilder(self.components, self.audio, self.emotions, corpus.removed_nodes())
         takes, gaps = [], []
         for utterance in track(corpus, "anime graph", len(corpus)):
@@ -183,19 +180,20 @@ class AnimeGraph(Method):
         pairs = list(permutations(self.emotions, 2))
         counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
         self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
+        self.facts["findings"] = [self.split.summary()] if len(self.emotions) > 1 else []
         for pair in track(pairs, "emotion maps"):
             try:
                 require_pairs(self.split, counts[pair], *pair)
             except FacesynthError as error:
                 self.facts["no_map"][" ".join(pair)] = str(error)
             else:
-                fitted.append(self._fit_map(matched(takes, self.split, *pair), pair, seed))
+                fitted.append(self._fit_map(matched(emotion_pairs(takes, *pair), self.split), pair, seed))
         self.maps.fill(fitted, self.split.emotional)
 
     def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:
         source, target = map(self.emotions.index, pair)
-        rbf = fit_map(samples, self.map_settings, seed=seed)
-        shift = lasting_shift(samples, self.split.emotional)
+        rbf = fit_map(beside_shift(samples, self.split), self.map_settings, seed=seed)
+        shift = lasting_shift(samples, self.split)
         return FittedMap(source, target, rbf, shift, dropped_shift(samples, self.components.mixing.numpy()))
 
     def _split(self, takes: Sequence[Take], seed: int) -> Split:

@@ -1,11 +1,11 @@
 """How well emotion maps do on sentences they did not see, and how many parallel sentences they need."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from facesynth.inference.arrays import Floats
 from facesynth.inference.closures import keep_shut
@@ -17,14 +17,16 @@ from facesynth.methods.anime_graph.mapping import (
     MapLearner,
     MapSettings,
     Samples,
+    beside_shift,
     dropped_shift,
     fit_map,
     lasting_shift,
     matched,
     require_pairs,
+    require_sentences,
 )
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
-from facesynth.methods.anime_graph.split import Split
+from facesynth.methods.anime_graph.split import Split, split_components
 from facesynth.motion.rbf import KERNELS, RbfMap
 from facesynth.progress import track
 
@@ -54,32 +56,78 @@ class MapScore:
 
 
 @dataclass(frozen=True, eq=False)
+class Learned:
+    """What a trial learned of takes without some sentences."""
+
+    components: FaceComponents
+    split: Split
+    takes: Sequence[Take]
+    """The takes that are judged, left-out sentences too, in those components."""
+
+
+Learner = Callable[[Sequence[Take]], tuple[FaceComponents, Split]]
+"""From takes to components and split."""
+
+
+def learner(layout: Layout, *, variance: float, override: Sequence[int] | None = None, seed: int = 0) -> Learner:
+    """Learns components and split as the anime graph does."""
+
+    def learn(takes: Sequence[Take]) -> tuple[FaceComponents, Split]:
+        components = FaceComponents().fit(np.concatenate([t.frames for t in takes]), layout, variance=variance, seed=seed)
+        return components, split_components(_encoded(takes, components), components, layout, override, seed=seed)
+
+    return learn
+
+
+def _encoded(takes: Sequence[Take], components: FaceComponents) -> Sequence[Take]:
+    return [replace(take, components=components.encode_array(take.frames)) for take in takes]
+
+
+ALL_KINDS = tuple(f"{kernel} {width}" for kernel in KERNELS for width in WIDTHS)
+
+
+@dataclass(frozen=True, eq=False)
 class MapTrial:
-    """What maps are judged with: recordings, their components and split."""
+    """What maps are judged with: recordings, and how components and split are learned.
+
+    A sentence that is left out is left out of everything: components and split are learned again without it.
+    """
 
     takes: Sequence[Take]
-    split: Split
-    components: FaceComponents
     layout: Layout
+    learn: Learner
     centres: int = 250
+    kinds: Sequence[str] = ALL_KINDS
+    """Kernels and widths that are judged."""
+    judged: frozenset[str] | None = None
+    """Sentences that are mapped and that maps are learned from; None: all."""
+    _known: dict[frozenset[str], Learned] = field(default_factory=dict)
 
-    @threadpool_limits.wrap(limits=1)  # as for learning maps
+    def without(self, left_out: Iterable[str] = ()) -> Learned:
+        """Components and split learned from all takes but those of some sentences, once."""
+        key = frozenset(left_out)
+        if key not in self._known:
+            components, split = self.learn([take for take in self.takes if take.sentence not in key])
+            asked = [take for take in self.takes if self.judged is None or take.sentence in self.judged]
+            self._known[key] = Learned(components, split, _encoded(asked, components))
+        return self._known[key]
+
     def score(self, source: str, target: str, *, folds: int | None = None, seed: int = 0) -> MapScore:
         """Leave sentences out, one by one or in so many `folds`, and map them by what the others teach."""
-        pairs, samples = self._pairs(source, target)
-        sentences = sorted({a.sentence for a, _ in pairs})
+        sentences = self._sentences(source, target)
         folds = min(folds or len(sentences), len(sentences))
         errors: dict[str, list[float]] = {}
         for fold in track(range(folds), f"{source} to {target}"):
             left_out = set(sentences[fold::folds])
-            known = [s for s in samples if s.sentence not in left_out]
-            learner = MapLearner(known, self.centres, seed=seed)
-            maps = {f"{kernel} {width}": learner.fit(width, kernel) for kernel in KERNELS for width in WIDTHS}
-            shifts = self._shifts(known)
-            mean = self._mean_difference([p for p in pairs if p[0].sentence not in left_out])
+            learned = self.without(left_out)
+            require_pairs(learned.split, len(sentences), source, target)
+            pairs = emotion_pairs(learned.takes, source, target)
+            known = [pair for pair in pairs if pair[0].sentence not in left_out]
+            maps = self._maps(learned, known, seed)
+            mean = self._mean_difference(learned, known)
             for pair in pairs:
                 if pair[0].sentence in left_out:
-                    for name, error in self._errors(pair, maps, shifts, mean).items():
+                    for name, error in self._errors(learned, pair, maps, mean).items():
                         errors.setdefault(name, []).append(error)
         means = {name: float(np.mean(values)) for name, values in errors.items()}
         unchanged, mean_difference = means.pop("unchanged"), means.pop("mean difference")
@@ -89,17 +137,18 @@ class MapTrial:
         self, source: str, target: str, settings: MapSettings, counts: Sequence[int] = (1, 2, 3, 5, 10, 15, 30), *, seed: int = 0
     ) -> dict[int, float]:
         """Unit-cube RMS on the last fifth of the sentences by the number of others learned from."""
-        pairs, samples = self._pairs(source, target)
-        sentences = np.random.default_rng(seed).permutation(sorted({a.sentence for a, _ in pairs})).tolist()
+        sentences = np.random.default_rng(seed).permutation(self._sentences(source, target)).tolist()
         asked = set(sentences[-max(1, len(sentences) // 5) :])
+        learned = self.without(asked)
+        require_pairs(learned.split, len(sentences), source, target)
+        pairs = emotion_pairs(learned.takes, source, target)
         curve = {}
         for count in (c for c in counts if c <= len(sentences) - len(asked)):
-            learned = set(sentences[:count])
             # One sentence cannot be left out of itself: its map takes the median width.
             fitting = settings if count > 1 else replace(settings, width="median")
-            known = [s for s in samples if s.sentence in learned]
-            rbf, shifts = fit_map(known, fitting, seed=seed), self._shifts(known)
-            errors = [self._errors(p, {"map": rbf}, shifts, np.zeros(1))["map"] for p in pairs if p[0].sentence in asked]
+            known = matched([pair for pair in pairs if pair[0].sentence in sentences[:count]], learned.split)
+            fitted = _fitted(learned, known, fit_map(beside_shift(known, learned.split), fitting, seed=seed))
+            errors = [self._error(learned, pair, fitted) for pair in pairs if pair[0].sentence in asked]
             curve[count] = float(np.mean(errors))
         return curve
 
@@ -108,13 +157,14 @@ class MapTrial:
 
         name: kernel and width, as in `MapScore.mapped`.
         """
-        pairs, samples = self._pairs(source, target)
-        a, b = pairs[0]
-        known = [s for s in samples if s.sentence != a.sentence]
-        kernel, width = next((k, w) for k in KERNELS for w in WIDTHS if f"{k} {w}" == name)
-        rbf = MapLearner(known, self.centres, seed=seed).fit(width, kernel)
-        truth = b.frames[aligned(a, b, self.split.speech)]
-        return a.frames.astype(np.float64), truth.astype(np.float64), self.mapped(a, rbf, *self._shifts(known))
+        first, *_ = self._sentences(source, target)
+        learned = self.without({first})
+        require_pairs(learned.split, len(self._sentences(source, target)), source, target)
+        pairs = emotion_pairs(learned.takes, source, target)
+        known = [pair for pair in pairs if pair[0].sentence != first]
+        a, b = next(pair for pair in pairs if pair[0].sentence == first)
+        fitted = replace(self, kinds=(name,))._maps(learned, known, seed)[name]
+        return a.frames.astype(np.float64), _truth(learned, a, b), self.mapped(learned, a, fitted)
 
     def with_sentences(self, most: int) -> "MapTrial":
         """The same with at most so many sentences, those that were recorded in the most emotions."""
@@ -122,37 +172,62 @@ class MapTrial:
         for take in self.takes:
             emotions.setdefault(take.sentence, set()).add(take.emotion)
         kept = sorted(emotions, key=lambda sentence: (-len(emotions[sentence]), sentence))[:most]
-        return replace(self, takes=[take for take in self.takes if take.sentence in kept])
+        return replace(self, judged=frozenset(kept), _known={})
 
-    def _pairs(self, source: str, target: str) -> tuple[list[tuple[Take, Take]], list[Samples]]:
-        pairs = emotion_pairs(self.takes, source, target)
-        require_pairs(self.split, len({a.sentence for a, _ in pairs}), source, target)
-        return pairs, matched(self.takes, self.split, source, target)
+    def _sentences(self, source: str, target: str) -> list[str]:
+        asked = [take for take in self.takes if self.judged is None or take.sentence in self.judged]
+        sentences = sorted({a.sentence for a, _ in emotion_pairs(asked, source, target)})
+        require_sentences(len(sentences), source, target)
+        return sentences
 
-    def _mean_difference(self, pairs: Sequence[tuple[Take, Take]]) -> Floats:
-        differences = [b.frames[aligned(a, b, self.split.speech)] - a.frames for a, b in pairs]
-        return np.concatenate(differences).mean(axis=0, dtype=np.float64)
+    def _maps(self, learned: Learned, known: Sequence[tuple[Take, Take]], seed: int) -> dict[str, "Fitted"]:
+        """By kernel and width."""
+        samples = matched(known, learned.split)
+        maps = MapLearner(beside_shift(samples, learned.split), self.centres, seed=seed)
+        named = {f"{kernel} {width}": (width, kernel) for kernel in KERNELS for width in WIDTHS}
+        return {name: _fitted(learned, samples, maps.fit(*named[name])) for name in self.kinds}
 
-    def _errors(
-        self, pair: tuple[Take, Take], maps: dict[str, RbfMap], shifts: tuple[Floats, Floats], mean: Floats
-    ) -> dict[str, float]:
+    def _mean_difference(self, learned: Learned, known: Sequence[tuple[Take, Take]]) -> Floats:
+        return np.concatenate([_truth(learned, a, b) - a.frames for a, b in known]).mean(axis=0)
+
+    def _errors(self, learned: Learned, pair: tuple[Take, Take], maps: Mapping[str, "Fitted"], mean: Floats) -> dict[str, float]:
         a, b = pair
-        truth = b.frames[aligned(a, b, self.split.speech)]
-        guesses = {name: self.mapped(a, rbf, *shifts) for name, rbf in maps.items()}
-        guesses |= {"unchanged": a.frames.astype(np.float64), "mean difference": a.frames + mean}
-        return {name: unit_cube_rms(guess, truth, self.layout) for name, guess in guesses.items()}
+        truth = _truth(learned, a, b)
+        plain = {"unchanged": a.frames.astype(np.float64), "mean difference": a.frames + mean}
+        errors = {name: unit_cube_rms(guess, truth, self.layout) for name, guess in plain.items()}
+        return errors | {name: self._error(learned, pair, fitted) for name, fitted in maps.items()}
 
-    def _shifts(self, known: Sequence[Samples]) -> tuple[Floats, Floats]:
-        return lasting_shift(known, self.split.emotional), dropped_shift(known, self.components.mixing.numpy())
+    def _error(self, learned: Learned, pair: tuple[Take, Take], fitted: "Fitted") -> float:
+        return unit_cube_rms(self.mapped(learned, pair[0], fitted), _truth(learned, *pair), self.layout)
 
-    def mapped(self, take: Take, rbf: RbfMap, shift: Floats, dropped: Floats) -> Floats:
+    def mapped(self, learned: Learned, take: Take, fitted: "Fitted") -> Floats:
         """[T, C] a recording, mapped."""
         import torch
 
-        change = np.tile(shift, (len(take.components), 1))
-        change[:, self.split.emotional] = rbf(torch.from_numpy(take.components[:, self.split.emotional])).numpy()
-        moved = take.frames + change @ self.components.mixing.numpy().T + dropped
+        change = np.tile(fitted.shift, (len(take.components), 1))
+        emotional = learned.split.emotional
+        change[:, emotional] += fitted.rbf(torch.from_numpy(take.components[:, emotional])).numpy()
+        moved = take.frames + change @ learned.components.mixing.numpy().T + fitted.dropped
         return keep_shut(moved, take.frames.astype(np.float64), self.layout)
+
+
+class Fitted(NamedTuple):
+    """A map from one emotion to another."""
+
+    rbf: RbfMap
+    shift: Floats
+    """[D]"""
+    dropped: Floats
+    """[C]"""
+
+
+def _fitted(learned: Learned, samples: Sequence[Samples], rbf: RbfMap) -> Fitted:
+    return Fitted(rbf, lasting_shift(samples, learned.split), dropped_shift(samples, learned.components.mixing.numpy()))
+
+
+def _truth(learned: Learned, a: Take, b: Take) -> Floats:
+    """[T, C] what was recorded in the other emotion when the same was said."""
+    return b.frames[aligned(a, b, learned.split.speech)].astype(np.float64)
 
 
 def unit_cube_rms(first: NDArray, second: NDArray, layout: Layout) -> float:

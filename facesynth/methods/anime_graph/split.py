@@ -1,12 +1,21 @@
-"""Which components carry speech, and which emotion (Cao 2005, §5.1.3)."""
+"""Which components carry speech, and which emotion (Cao 2005, §5.1.3).
+
+Decided by evidence: that emotions change a component more than another take of the same emotion does is tested by
+permutation, and of the components that pass, as many as are wrong by chance are expected to be a twentieth (false discovery
+rate, Benjamini and Hochberg 1995). What share of the change is the emotion's, 1 - (takes' / emotions')², says whether
+such a component carries emotion and little else. Where none does, because each carries speech too, all are mapped, each by
+its share, so that the speech ones change little more than on average.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import false_discovery_control
 
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
@@ -14,10 +23,11 @@ from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.components import FaceComponents, block_columns
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs, retakes
 
-RATIO = 2.0
-"""A component is emotional when emotions change it this much more (RMS) than another take of the same does."""
-CHANCE = 0.05
-"""… and when the chance that shuffled pairs differ as much is smaller than this."""
+SHARE = 0.75
+"""A component is emotional when this share of its squared change between emotions is not found between takes of one: when
+emotions change it twice as much (RMS) …"""
+DISCOVERY = 0.05
+"""… and it is among components of which so many are expected to be found by chance."""
 MOUTH_SHARE = 0.02
 """A component is speech when it explains this share of the mouth's motion within sentences."""
 MOSTLY_SPEECH = 0.25
@@ -34,24 +44,62 @@ class Split:
     ratio: Floats
     """[D] RMS difference between emotions over that between takes of one emotion."""
     chance: Floats
-    """[D] p-value of that by permutation."""
+    """[D] p-value of that by permutation …"""
+    discovery: Floats
+    """[D] … and the share of false ones among all components that are as unlikely."""
     mouth_share: Floats
     """[D] share of the mouth's motion that each component explains alone."""
     emotional: NDArray[np.int64]
+    """The components that maps change, in ascending order: all of them where `mixed`."""
     speech: NDArray[np.int64]
     yardstick: str
     """`takes`, or, in corpora without second takes, `sentences`."""
+    mixed: bool = False
+    """Whether emotions change components, but none of them is emotional and little else."""
+
+    @cached_property
+    def emotion_share(self) -> Floats:
+        """[D] share of the squared difference between emotions that is the emotion's: 0 where takes differ as much."""
+        return np.maximum(0.0, 1 - 1 / np.maximum(self.ratio, 1.0) ** 2)
+
+    @property
+    def weights(self) -> Floats:
+        """[E] how much of the emotional components' change depends on the pose: all, or where they are mixed the share."""
+        return self.emotion_share[self.emotional] if self.mixed else np.ones(len(self.emotional))
+
+    def summary(self) -> str:
+        """One sentence that says what was found."""
+        if not len(self.ratio):
+            return "no sentence was recorded in two emotions: there are no emotion maps"
+        count, changed = len(self.ratio), int((self.discovery < DISCOVERY).sum())
+        than = "another take does" if self.yardstick == "takes" else "by chance from sentence to sentence"
+        evidence = (
+            f"{changed} of {count} components change with emotion more than {than} (false discovery rate below {DISCOVERY:g})"
+        )
+        if self.mixed:
+            most = float(self.emotion_share[self.discovery < DISCOVERY].max())
+            return (
+                f"{evidence}, but none is emotional and little else (at most {most:.0%} of a difference is the emotion's, or it "
+                f"moves the mouth): all are mapped, those of speech weighted down"
+            )
+        if not len(self.emotional):
+            return f"{evidence}: there is nothing to map"
+        names = ", ".join(map(str, self.emotional.tolist()))
+        return f"{evidence}; emotion maps change {len(self.emotional)} of them ({names}) and shift the others by the mean"
 
     def report(self, blocks: Sequence[str], block: Sequence[int]) -> list[dict[str, Any]]:
         """One row for each component, for people and for JSON."""
-        kinds = {**dict.fromkeys(self.speech.tolist(), "speech"), **dict.fromkeys(self.emotional.tolist(), "emotion")}
+        emotional = [] if self.mixed else self.emotional.tolist()
+        kinds = {**dict.fromkeys(self.speech.tolist(), "speech"), **dict.fromkeys(emotional, "emotion")}
         return [
             {
                 "component": n,
                 "block": blocks[block[n]],
                 "is": kinds.get(n, "neither"),
                 "emotion_ratio": round(float(self.ratio[n]), 3),
+                "emotion_share": round(float(self.emotion_share[n]), 3),
                 "chance": round(float(self.chance[n]), 4),
+                "false_discovery": round(float(self.discovery[n]), 4),
                 "mouth_share": round(float(self.mouth_share[n]), 4),
                 "yardstick": self.yardstick,
             }
@@ -60,7 +108,7 @@ class Split:
 
 
 _NO_SCORES, _NONE = np.zeros(0), np.zeros(0, np.int64)
-NOTHING_SPLIT = Split(_NO_SCORES, _NO_SCORES, _NO_SCORES, _NONE, _NONE, "none")
+NOTHING_SPLIT = Split(_NO_SCORES, _NO_SCORES, _NO_SCORES, _NO_SCORES, _NONE, _NONE, "none")
 """Of a corpus in which no sentence was recorded in two emotions."""
 
 
@@ -82,16 +130,29 @@ def split_components(
         ratio, chance = _against_takes(_squares(between), _squares(within), rng)
     else:
         ratio, chance = _against_sentences(np.array([d.mean(axis=0) for d in between]), rng)
-    if override is None:
-        emotional = np.flatnonzero((ratio >= RATIO) & (chance < CHANCE) & (share <= MOSTLY_SPEECH))
-    else:
-        emotional = np.unique(np.asarray(override, np.int64))
-        if len(emotional) and not 0 <= emotional[0] <= emotional[-1] < components.count:
-            raise FacesynthError(f"emotional components must be 0 to {components.count - 1}; got {list(override)}")
-    speech = np.setdiff1d(by, emotional)
+    discovery = false_discovery_control(chance)
+    scored = Split(ratio, chance, discovery, share, _NONE, by, "takes" if len(within) >= 2 else "sentences")
+    emotional, mixed = _emotional(scored) if override is None else (_named(override, components.count), False)
+    speech = by if mixed else np.setdiff1d(by, emotional)
     if not len(speech):
         speech = np.setdiff1d(np.arange(components.count), emotional)[:1]
-    return Split(ratio, chance, share, emotional, speech, "takes" if len(within) >= 2 else "sentences")
+    return replace(scored, emotional=emotional, speech=speech, mixed=mixed)
+
+
+def _emotional(scored: Split) -> tuple[NDArray[np.int64], bool]:
+    """The components that maps change, and whether they are all of them for want of purely emotional ones."""
+    found = scored.discovery < DISCOVERY
+    pure = np.flatnonzero(found & (scored.emotion_share >= SHARE) & (scored.mouth_share <= MOSTLY_SPEECH))
+    if len(pure) or not found.any():
+        return pure, False
+    return np.arange(len(found)), True
+
+
+def _named(override: Sequence[int], count: int) -> NDArray[np.int64]:
+    emotional = np.unique(np.asarray(override, np.int64))
+    if len(emotional) and not 0 <= emotional[0] <= emotional[-1] < count:
+        raise FacesynthError(f"emotional components must be 0 to {count - 1}; got {list(override)}")
+    return emotional
 
 
 def mouth_shares(takes: Sequence[Take], components: FaceComponents, layout: Layout) -> Floats:
