@@ -9,7 +9,7 @@ from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
 from facesynth.graph_builder import Builder, power_spectrum
 from facesynth.methods.lds.method import LDS
-from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE
+from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE, STEP
 
 
 def lds_content(model: LDS) -> Content:
@@ -26,12 +26,15 @@ def lds_content(model: LDS) -> Content:
 
 
 def features_graph(model: LDS) -> Graph:
-    """Windows of sound [B, T, L] to the periodogram [B, T, 256] and the system's input [B, T, m]."""
+    """Windows of sound [B, T, L] to the periodogram [B, T, S 256] and the system's input [B, T, m]."""
     part, periodogram = model.features, model.periodogram
-    length = len(periodogram.window)
+    length, coefficients = periodogram.length, COEFFICIENTS * periodogram.parts
     width, each = len(part.scale), periodogram.bins_each
     b = Builder("features")
     windows = b.input("windows", "float32", ("batch", "frames", length))
+    if periodogram.around:
+        places = STEP * np.arange(periodogram.parts)[:, None] + np.arange(len(periodogram.window))
+        windows = b.op("Gather", windows, b.constant(places), axis=2)
     bins = np.arange(1, 1 + COEFFICIENTS * each)
     power = power_spectrum(b, windows, periodogram.window.numpy(), bins, 2 * COEFFICIENTS * each, "float32")
     if each > 1:
@@ -39,11 +42,13 @@ def features_graph(model: LDS) -> Graph:
         power = b.op("MatMul", power, b.constant(averaging, "float32"))
     if periodogram.scale == "log":
         power = b.op("Log", b.op("Add", power, b.constant(FLOOR, "float32")))
+    if periodogram.around:
+        power = b.op("Reshape", power, b.ints(0, 0, coefficients))
     components = b.op("MatMul", b.op("Sub", power, b.constant(part.pca.mean.numpy())), b.constant(part.pca.basis.numpy()))
     scaled = b.op("Div", components, b.constant(part.scale.numpy()))
     held = b.op("Min", b.op("Max", scaled, b.constant(part.low.numpy())), b.constant(part.high.numpy()))
     outputs = (
-        Port("periodogram", "float32", ("batch", "frames", COEFFICIENTS), f"{periodogram.scale} power", model.fps),
+        Port("periodogram", "float32", ("batch", "frames", coefficients), f"{periodogram.scale} power", model.fps),
         Port("features", "float32", ("batch", "frames", width), "standard deviations", model.fps),
     )
     for value, port in zip((power, held), outputs, strict=True):
@@ -91,6 +96,7 @@ def rollout_graph(model: LDS) -> Graph:
     """Features [B, T, m], innovations [B, T, p] and a state [B, n] to frames [B, T, C] and the state after them."""
     layout, system, shape = model.fitted_layout, model.rollout, model.shape
     n, p = len(system.A), len(system.C)
+    C, D = (matrix.numpy() for matrix in system.shown)
     m = system.B.shape[1] - p
     b = Builder("rollout")
     inputs = (
@@ -102,8 +108,8 @@ def rollout_graph(model: LDS) -> Graph:
     drive = b.op("Concat", u, e, axis=-1)
     push = b.op("Transpose", b.op("MatMul", drive, b.constant(system.B.numpy().T)), perm=[1, 0, 2])
     after, states = b.ops("Scan", 2, state, push, body=_step(system.A.numpy()).graph(), num_scan_inputs=1)
-    seen = b.op("MatMul", b.op("Transpose", states, perm=[1, 0, 2]), b.constant(system.C.numpy().T))
-    components = b.op("Add", seen, b.op("MatMul", drive, b.constant(system.D.numpy().T)))
+    seen = b.op("MatMul", b.op("Transpose", states, perm=[1, 0, 2]), b.constant(C.T))
+    components = b.op("Add", seen, b.op("MatMul", drive, b.constant(D.T)))
     decoder = shape.scale.numpy()[:, None] * shape.pca.basis.numpy().T
     frames = b.op("Add", b.op("MatMul", components, b.constant(decoder)), b.constant(shape.pca.mean.numpy()))
     if layout.kind == "curves":

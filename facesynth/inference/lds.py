@@ -1,20 +1,24 @@
 """The linear dynamical system: sound in, frames out, at once or as the sound comes in."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Floats
 from .checks import checked_audio, checked_piece, checked_rate, checked_seed, require_open
+from .closures import close_at
 from .errors import FacesynthError, reject_options
 from .folder import MANIFEST, Folder
 from .graphs import Graph, Part
 from .layout import Layout
+from .lips import bilabial_spans
 from .motion import Motion
 from .sound import resample
+from .speech_state import STATES, amounts_along
 from .windows import FrameWindows
 
 MOST_FRAMES = 1024
@@ -27,6 +31,8 @@ class LdsState:
 
     system: NDArray[np.float32]
     """[1, n] state of the system before the next frame."""
+    plain: NDArray[np.float32]
+    """[1, n] the same of a system without noise."""
     heard: NDArray[np.float32]
     """[S'] the sound that later frames need."""
     first: int
@@ -59,12 +65,18 @@ class LdsSettings:
     """Of the shape, p."""
     states: int
     """n"""
+    noise_amounts: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(STATES, 1.0))
+    """How much of the noise belongs to each state of the speech; without phones `unknown` counts."""
+    closed_gap: float | None = None
+    """How near the lips come at a p, b or m; None: they are left as they are."""
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:
         """From a manifest's settings, which may hold more."""
         window, lead_ms, settling_s = int(plain["window_samples"]), float(plain["lead_ms"]), float(plain["settling_s"])
-        return cls(window, lead_ms, settling_s, int(plain["features"]), int(plain["components"]), int(plain["states"]))
+        sizes = (int(plain[name]) for name in ("features", "components", "states"))
+        amounts = {name: float(plain["noise_amounts"][name]) for name in STATES}
+        return cls(window, lead_ms, settling_s, *sizes, amounts, plain["closed_gap"])
 
     def windows(self, fps: float, rate: int) -> FrameWindows:
         """Of sound at a rate in Hz, for frames at `fps`."""
@@ -101,13 +113,19 @@ class Lds:
         return self.windows.look_ahead_s
 
     def synthesize(self, speech: Any, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
-        """Motion for speech, of which only the sound counts; `noise` 1 as recorded, 0 the deterministic part alone."""
+        """Motion for speech; `noise` 1 as learned, 0 the deterministic part alone.
+
+        The system hears the sound alone. Where phones are given they say how much noise there is, and where lips are shut.
+        """
         reject_options("lds", options, ("seed", "noise"))
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         audio = resample(checked_audio(speech.audio), speech.sample_rate, self.rate)
         state = replace(self.start(seed=seed, noise=noise), heard=audio)
-        frames, _ = self._frames(state, count)
-        return Motion(frames, self.fps, self.layout)
+        frames, _ = self._frames(state, count, amounts_along(self.settings.noise_amounts, speech.phones, self.fps, count))
+        if self.settings.closed_gap is not None:
+            spans = bilabial_spans(speech.phones, self.fps)
+            frames = close_at(frames.astype(np.float64), self.layout, spans, self.settings.closed_gap, self.fps)
+        return Motion(frames.astype(np.float32), self.fps, self.layout)
 
     def start(self, *, seed: int = 0, noise: float = 1.0) -> LdsState:
         """The state before the first sample: the noise has already run for some seconds."""
@@ -118,7 +136,7 @@ class Lds:
         no_sound = np.zeros((1, count, self.settings.features), np.float32)
         rest = np.zeros((1, self.settings.states), np.float32)
         _, system = self.rollout(features=no_sound, innovations=self._draw(rng, count, noise), state=rest)
-        return LdsState(system, np.zeros(0, np.float32), 0, 0, noise, rng.bit_generator.state)
+        return LdsState(system, rest, np.zeros(0, np.float32), 0, 0, noise, rng.bit_generator.state)
 
     def advance(self, state: LdsState, audio: ArrayLike) -> tuple[NDArray[np.float32], LdsState]:
         """More sound [S] at the model's rate: the frames [t, C] that became final, possibly none, and the state after them."""
@@ -140,21 +158,28 @@ class Lds:
         """Frames of the sound so far."""
         return round(state.samples / self.rate * self.fps)
 
-    def _frames(self, state: LdsState, stop: int) -> tuple[NDArray[np.float32], LdsState]:
-        """Frames from the state's next up to `stop`; sound that is not there is silence."""
+    def _frames(self, state: LdsState, stop: int, amounts: Floats | None = None) -> tuple[NDArray[np.float32], LdsState]:
+        """Frames from the state's next up to `stop`; sound that is not there is silence.
+
+        The system is linear, so that what the noise adds is the difference to a system without; `amounts` [stop] of it are
+        taken, of speech whose phones nobody knows where they are not given.
+        """
         done = [np.zeros((0, self.layout.channels), np.float32)]
         rng = np.random.default_rng(0)
         rng.bit_generator.state = state.random
-        system = state.system
+        system, plain, unknown = state.system, state.plain, self.settings.noise_amounts["unknown"]
         for first in range(state.frames, stop, MOST_FRAMES):
             last = min(first + MOST_FRAMES, stop)
             _, features = self.features(windows=self.windows.cut(state.heard, state.first, first, last)[None])
-            frames, system = self.rollout(features=features, innovations=self._draw(rng, last - first, state.noise), state=system)
-            done.append(frames[0])
+            drawn = self._draw(rng, last - first, state.noise)
+            frames, system = self.rollout(features=features, innovations=drawn, state=system)
+            still, plain = self.rollout(features=features, innovations=np.zeros_like(drawn), state=plain)
+            amount = np.full(last - first, unknown) if amounts is None else amounts[first:last]
+            done.append(still[0] + amount.astype(np.float32)[:, None] * (frames[0] - still[0]))
         stop = max(stop, state.frames)
         kept = int(np.clip(self.windows.starts(stop, stop + 1)[0] - state.first, 0, len(state.heard)))
         heard, first_kept = state.heard[kept:], state.first + kept
-        return np.concatenate(done), LdsState(system, heard, first_kept, stop, state.noise, rng.bit_generator.state)
+        return np.concatenate(done), LdsState(system, plain, heard, first_kept, stop, state.noise, rng.bit_generator.state)
 
     def _draw(self, rng: np.random.Generator, count: int, noise: float) -> NDArray[np.float32]:
         """[1, count, p]"""

@@ -31,7 +31,7 @@ def driven(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def errors(driven):
-    return cross_validate(driven, {"LDS": QUICK}, folds=2)
+    return cross_validate(driven, {"LDS": {**QUICK, "context_ms": 0}}, folds=2)
 
 
 def test_every_row_is_judged_on_every_utterance(driven, errors):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 
 from facesynth.export.graph import difference
 from facesynth.inference import FacesynthError, Resampler, load, resample
-from facesynth.inference.speech import Speech
+from facesynth.inference.speech import PhoneTrack, Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.audio import resample as facesynth_resample
 
@@ -34,11 +36,12 @@ def test_sound_of_any_rate(pair, speeches, rate):
     assert difference(runtime.synthesize(other).frames, model.synthesize(other).frames) < 1e-5
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(sizes=st.lists(st.integers(1, 6000), min_size=1, max_size=12), seed=st.integers(0, 99))
 def test_pieces_of_any_size_give_what_the_whole_gives(pair, speeches, sizes, seed):
     _, runtime = pair
     speech = speeches[seed % len(speeches)]
+    speech = replace(speech, phones=PhoneTrack(("pau",), speech.phones.ends_s[-1:]))  # a stream of sound knows none
     wanted = runtime.synthesize(speech, seed=seed).frames
     stream, pieces, at = runtime.stream(seed=seed), [], 0
     for size in [*sizes, len(speech.audio)]:
@@ -94,7 +97,7 @@ def test_sound_of_44100_hz_is_streamed(pair, speeches):
 
 def test_one_sample_at_a_time_and_the_stated_latency(pair, speeches):
     _, runtime = pair
-    sound = speeches[0].audio[:3000]
+    sound = speeches[0].audio[:6000]
     stream, frames = runtime.stream(), []
     for k in range(len(sound)):
         for frame in stream.push(sound[k : k + 1]):

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,21 @@ from facesynth.config import load_config
 from facesynth.corpus import Corpus, Record
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
+from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.innovations import Innovations
+from facesynth.methods.lds.learned_input import learned_input
 from facesynth.methods.lds.method import LDS
+from facesynth.methods.lds.noise_amounts import noise_amounts, noise_gains
 from facesynth.methods.lds.plots import plot_innovations, plot_orders
 from facesynth.methods.lds.prediction import innovations, one_step
+from facesynth.methods.lds.recordings import Piece
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.selection import folds, plainest_good
 from facesynth.methods.lds.system import Clip
 from facesynth.methods.registry import load
+from facesynth.speech.periodogram import Periodogram
 
 QUICK = {"features": 4, "components": 4, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
 
@@ -93,12 +99,65 @@ def test_noise_moves_samples_away_from_the_deterministic_part_in_proportion(corp
     np.testing.assert_allclose(half - plain, (full - plain) / 2, atol=1e-3)
 
 
+def test_a_sample_is_nearer_than_the_mean_pose(driven):
+    train, test = driven.subset(driven.ids[:9]), driven.subset(driven.ids[9:])
+    model = LDS(features=8, components=2).fit(train)
+    mean = np.concatenate([utterance.motion.frames for utterance in train]).mean(axis=0)
+    for utterance in test:
+        truth = utterance.motion.frames
+        drawn = model.synthesize(utterance.speech, seed=5).frames
+        assert ((drawn - truth) ** 2).mean() < ((mean - truth) ** 2).mean()
+
+
+def test_lips_are_shut_without_noise_where_they_were_recorded_shut(corpus, model):
+    spans = [(u, a, b) for u in corpus for a, b in bilabial_spans(u.speech.phones, 60) if b - a > 3]
+    assert len(spans) > 3
+    for utterance, start, stop in spans:
+        plain, sample = (model.synthesize(utterance.speech, seed=2, noise=noise) for noise in (0, 1))
+        middle = slice(start + 1, stop - 1)
+        np.testing.assert_allclose(sample.frames[middle], plain.frames[middle], atol=1e-3)
+        assert lip_gap(sample)[start:stop].min() < model.facts["closed_gap"] + 0.1
+
+
+def test_the_papers_noise_is_everywhere(corpus):
+    paper = {"context_ms": 0, "fitted_to": "steps", "own_means": False, "noise_by_state": False, "close_lips": False}
+    model = LDS(**QUICK, **paper).fit(corpus)
+    speech = corpus[corpus.ids[0]].speech
+    unknown = replace(speech, phones=PhoneTrack(("pau",), speech.phones.ends_s[-1:]))
+    np.testing.assert_array_equal(model.synthesize(speech, seed=2).frames, model.synthesize(unknown, seed=2).frames)
+
+
+def test_amounts_and_gains_of_noise_are_what_was_left():
+    rng = np.random.default_rng(0)
+    states = np.repeat([1, 2, 0], 4000)
+    left = rng.normal(size=(12000, 2)) * np.where(states == 1, 2.0, 1.0)[:, None] * [1.0, 0.1]
+    shape = np.stack([np.sqrt(1.5) * rng.normal(size=12000), rng.normal(size=12000)], axis=1)
+    amounts = noise_amounts([left], [states], np.ones(2))
+    assert amounts["vowel"] == pytest.approx(2 * amounts["consonant"], rel=0.05)
+    assert amounts["closure"] == 0
+    gains = noise_gains([shape], [left], [states], amounts)
+    assert gains.tolist() == [0, 1]  # the first is left over more than explained; of the second hardly anything is
+
+
+def test_the_learned_input_of_a_recording_does_not_come_from_itself():
+    """Noise teaches nothing about noise: an input that had seen its own recording would follow it."""
+    rng = np.random.default_rng(0)
+    pieces = [
+        Piece(f"s{k}", rng.normal(size=32000).astype(np.float32), 0, np.zeros((60, 2), np.float32), np.full(60, 4), [])
+        for k in range(4)
+    ]
+    shapes = [rng.normal(size=(60, 2)) for _ in pieces]
+    _, inputs = learned_input(pieces, shapes, Periodogram(30.0, context_ms=200.0), 24)
+    alike = np.corrcoef(np.concatenate(inputs).T, np.concatenate(shapes).T)[:2, 2:]
+    assert np.abs(np.diag(alike)).max() < 0.3
+
+
 def test_a_saved_model_speaks_the_same(corpus, model, tmp_path):
     model.save(tmp_path / "model.safetensors")
     speech = corpus[corpus.ids[1]].speech
     back = load(tmp_path / "model.safetensors")
     assert isinstance(back, LDS)
-    assert np.array_equal(back.synthesize(speech, seed=3).frames, model.synthesize(speech, seed=3).frames)
+    np.testing.assert_allclose(back.synthesize(speech, seed=3).frames, model.synthesize(speech, seed=3).frames, atol=1e-4)
 
 
 def test_fits_repeat(corpus, model):
@@ -254,6 +313,8 @@ def test_constant_recordings_are_refused(corpus, tmp_path, what):
         ({"rows": 0}, "rows"),
         ({"stochastic_order": 1.5}, "stochastic_order"),
         ({"lead_ms": "soon"}, "lead"),
+        ({"context_ms": -40}, "context_ms"),
+        ({"fitted_to": "run"}, "runs"),
     ],
 )
 def test_bad_settings_are_refused(config, word):

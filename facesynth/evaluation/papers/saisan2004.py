@@ -19,8 +19,17 @@ from facesynth.methods.lds.plots import innovations_figure
 from facesynth.methods.registry import create
 
 SHOWN = Stated("a curve", "not shown", "the paper shows the error of one point, in pixels of its video")
-SETTINGS = {"scale": "linear", "features": 4, "lead_ms": 0.0, "own_means": False}
-OWN = "logarithmic periodogram and chosen lead, deterministic part"
+SETTINGS = {
+    "scale": "linear",
+    "context_ms": 0.0,
+    "features": 4,
+    "lead_ms": 0.0,
+    "fitted_to": "steps",
+    "own_means": False,
+    "noise_by_state": False,
+    "close_lips": False,
+}
+OWN = "input learned from the sound around a frame, deterministic part"
 PAPERS = "the paper's features, deterministic part"
 
 

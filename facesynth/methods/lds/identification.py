@@ -13,13 +13,15 @@ REFITS = 2
 """How often the deterministic part is fitted again with the noise model known."""
 
 
-def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> LinearSystem:
+def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int], refits: int = REFITS) -> LinearSystem:
     """A system with `orders` = (deterministic, stochastic) states from clips of any lengths.
 
     `rows` is k, the number of block rows: how many frames of past and of future are compared.
     Signals should have zero mean and comparable scale. The stochastic part is identified from what
     the deterministic part leaves of the output and not from the projection that is orthogonal
     to the inputs, because that projection still holds deterministic state that a finite window cannot see.
+    `refits`: how often the deterministic part is fitted again through the inverse noise model, which is best where the
+    recordings come from such a system; 0 leaves it what follows the recordings best when it runs by itself.
     """
     past = noise_rows(sum(len(clip.y) for clip in clips), rows, clips[0].y.shape[1])
     require_rows_for(orders, (rows, past), clips[0].u.shape[1], clips[0].y.shape[1])
@@ -27,11 +29,11 @@ def identify(clips: Sequence[Clip], rows: int, orders: tuple[int, int]) -> Linea
     A, C = shift_invariance(gamma, clips[0].y.shape[1], orders[0])
     A, repaired = stabilised(A)
     deterministic, starts = fit_inputs(A, C, clips, None)
-    for refit in range(REFITS + 1):
+    for refit in range(refits + 1):
         rest = [clip.y - deterministic.simulate(clip.u, start) for clip, start in zip(clips, starts, strict=True)]
         functionals, correlations = predictor_space(rest, past)
         stochastic, moved = realise(rest, past, functionals, orders[1])
-        if refit < REFITS:
+        if refit < refits:
             deterministic, starts = fit_inputs(A, C, clips, stochastic)
     return LinearSystem(deterministic, stochastic, starts, singular, correlations, repaired + moved)
 

@@ -1,19 +1,23 @@
 """The linear dynamical system as a method of the zoo."""
 
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus
-from facesynth.inference.errors import FacesynthError
+from facesynth.inference.arrays import Ints
+from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.lds import Lds, LdsSettings, LdsStream
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
+from facesynth.inference.speech_state import STATES
 from facesynth.methods.lds.capabilities import CAPABILITIES
-from facesynth.methods.lds.identification import fitting_rows, identify
+from facesynth.methods.lds.identification import REFITS, fitting_rows, identify
 from facesynth.methods.lds.innovations import Innovations, innovations_of
+from facesynth.methods.lds.learned_input import learned_input
+from facesynth.methods.lds.noise_amounts import noise_amounts, noise_gains
 from facesynth.methods.lds.recordings import Piece, Standardised, periodograms, pieces_of
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, plain
@@ -23,6 +27,7 @@ from facesynth.methods.parts import part
 from facesynth.methods.registry import register
 from facesynth.speech.periodogram import RATE, Periodogram, Scale
 
+FITTED_TO = ("runs", "steps")
 SETTLING_S = 4.0
 """How long the noise runs before the first frame, so that it starts as it goes on."""
 
@@ -35,6 +40,9 @@ class LDS(Method):
     ----------
     scale : "log" or "linear"
         Of the periodogram; the paper's is linear.
+    context_ms : float
+        How much sound before and after a frame a regression learns the input from; 0: the input is the principal components
+        of the frame's own periodogram, as in the paper.
     features : float
         Principal components of the periodogram: a count, or below 1 a share of variance. The paper has 4.
     lead_ms : float or "auto"
@@ -45,9 +53,17 @@ class LDS(Method):
         Block rows k: frames of past and of future that are compared. Lowered where the recording is short.
     deterministic_order, stochastic_order : int or "auto"
         States of the two parts; chosen by the error on clips left out.
+    fitted_to : "runs" or "steps"
+        What the deterministic part is fitted to: the recordings as the sound alone leads through them, which is what is
+        synthesised, or each next frame (the paper), which is best if motion really is such a system.
     own_means : bool
         Whether each clip's own mean is taken out of sound and shape before the dynamics are learned: how the head was held
         that time, or which mood it was, is not in the sound, and would be taken for slow states. The paper has one clip.
+    noise_by_state : bool
+        Whether there is less noise where less was left unexplained, none in closures, and only as much that a sample is nearer
+        than the mean face; without, all that was left, everywhere, as in the paper.
+    close_lips : bool
+        Whether lips are shut at each p, b and m as far as they were in the recordings, where phones are given.
     """
 
     features: Standardised
@@ -59,13 +75,17 @@ class LDS(Method):
         self,
         *,
         scale: Scale = "log",
-        features: float = 8,
+        context_ms: float = 200.0,
+        features: float = 24,
         lead_ms: float | Auto = "auto",
         components: float = 8,
         rows: int = 8,
         deterministic_order: int | Auto = "auto",
         stochastic_order: int | Auto = "auto",
+        fitted_to: Literal["runs", "steps"] = "runs",
         own_means: bool = True,
+        noise_by_state: bool = True,
+        close_lips: bool = True,
     ) -> None:
         super().__init__()
         _check(self.config)
@@ -81,17 +101,24 @@ class LDS(Method):
         weights = self.shape.scale.double().square().numpy()
         sentences = [piece.sentence for piece in pieces]
 
-        lead = choose_lead(
-            self.config["lead_ms"], lambda lead_ms: self._clips(pieces, lead_ms), sentences, self.config["rows"], weights
-        )
+        # A context has the sound before and after a frame in it: it needs no lead.
+        wanted_ms = 0.0 if self.config["context_ms"] and self.config["lead_ms"] == "auto" else self.config["lead_ms"]
+        lead = choose_lead(wanted_ms, lambda lead_ms: self._clips(pieces, lead_ms), sentences, self.config["rows"], weights)
         clips = self._clips(pieces, lead.chosen)
         rows = fitting_rows(clips, self.config["rows"])
         wanted = self.config["deterministic_order"], self.config["stochastic_order"]
         orders = choose_orders(wanted, clips, sentences, rows, weights)
-        system = identify(clips, rows, (int(orders[0].chosen), int(orders[1].chosen)))
+        refits = 0 if self.config["fitted_to"] == "runs" else REFITS
+        system = identify(clips, rows, (int(orders[0].chosen), int(orders[1].chosen)), refits)
 
         self._keep(system, clips, rows, seed)
+        if self.config["noise_by_state"]:
+            self._learn_amounts(system.stochastic_output(tuple(clips)), clips, [piece.states for piece in pieces], weights)
+        gaps = [gap for piece in pieces for gap in piece.gaps]
+        if self.config["close_lips"] and gaps:
+            self.facts["closed_gap"] = float(np.median(gaps))
         self.facts |= {
+            "context_ms": float(self.config["context_ms"]),
             "frames_left_out_for_gaps": left_out,
             "rows": rows,
             "lead_ms": plain(lead),
@@ -101,10 +128,16 @@ class LDS(Method):
         }
         return self.to(device)
 
-    def synthesize(self, speech: Speech, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
-        """Motion for new speech, of which only the sound counts: this model knows neither phones nor emotions.
+    def _learn_amounts(self, left: list[Array], clips: list[Clip], states: list[Ints], weights: Array) -> None:
+        amounts = noise_amounts(left, states, weights)
+        gains = noise_gains([clip.y for clip in clips], left, states, amounts)
+        self.rollout.gains = torch.from_numpy(gains).float()
+        self.facts |= {"noise_amounts": amounts, "noise_gains": gains.tolist()}
 
-        `noise` scales the innovations: 1 as recorded, 0 for the deterministic part alone.
+    def synthesize(self, speech: Speech, *, seed: int = 0, noise: float = 1.0, **options: Any) -> Motion:
+        """Motion for new speech, driven by its sound alone; `noise` 1 as learned, 0 for the deterministic part alone.
+
+        Where phones are given they say how much noise there is (`noise_by_state`) and where lips are shut (`close_lips`).
         """
         return self.speaker().synthesize(speech, seed=seed, noise=noise, **options)
 
@@ -129,16 +162,20 @@ class LDS(Method):
     def settings(self) -> LdsSettings:
         """Sizes and times of the trained system."""
         features, components, states = len(self.features.scale), len(self.shape.scale), len(self.rollout.A)
-        return LdsSettings(len(self.periodogram.window), self.periodogram.lead_ms, SETTLING_S, features, components, states)
+        periodogram, amounts = self.periodogram, self.facts.get("noise_amounts", dict.fromkeys(STATES, 1.0))
+        gap = self.facts.get("closed_gap")
+        return LdsSettings(periodogram.length, periodogram.lead_ms, SETTLING_S, features, components, states, amounts, gap)
 
     @property
     def periodogram(self) -> Periodogram:
         """How the sound is heard, with the lead that was chosen."""
-        periodogram = Periodogram(self.fps, self.config["scale"], self.facts["lead_ms"]["chosen"])
+        # Models from before there was a context state none.
+        context_ms = self.facts.get("context_ms", 0.0)
+        periodogram = Periodogram(self.fps, self.config["scale"], self.facts["lead_ms"]["chosen"], context_ms)
         return periodogram.to(self.features.scale.device)
 
     def features_of(self, windows: Tensor) -> tuple[Tensor, Tensor]:
-        """Windows of sound [..., T, L] to the periodogram [..., T, 256] and the system's input [..., T, m]."""
+        """Windows of sound [..., T, L] to the periodogram [..., T, S 256] and the system's input [..., T, m]."""
         power = self.periodogram.spectrum(windows)
         return power, self.features.encode(power)
 
@@ -153,12 +190,15 @@ class LDS(Method):
         return self.features.encode(self.periodogram.of(speech, count))
 
     def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
-        sounds = periodograms(pieces, Periodogram(self.fps, self.config["scale"], lead_ms))
-        self.features = Standardised.fit(sounds, self.config["features"], "the sound")
-        clips = [
-            Clip(_encoded(self.features, sound), _encoded(self.shape, piece.frames))
-            for sound, piece in zip(sounds, pieces, strict=True)
-        ]
+        shapes = [_encoded(self.shape, piece.frames) for piece in pieces]
+        periodogram = Periodogram(self.fps, self.config["scale"], lead_ms, self.config["context_ms"])
+        if periodogram.around:
+            self.features, inputs = learned_input(pieces, shapes, periodogram, self.config["features"])
+        else:
+            sounds = periodograms(pieces, periodogram)
+            self.features = Standardised.fit(sounds, self.config["features"], "the sound")
+            inputs = [_encoded(self.features, sound) for sound in sounds]
+        clips = [Clip(u, y) for u, y in zip(inputs, shapes, strict=True)]
         return [clip.centred() for clip in clips] if self.config["own_means"] else clips
 
     def _keep(self, system: LinearSystem, clips: list[Clip], rows: int, seed: int) -> None:
@@ -180,10 +220,12 @@ def _encoded(part: Standardised, frames: np.ndarray) -> Array:
 
 
 def _check(config: dict[str, Any]) -> None:
-    Periodogram(25.0, config["scale"])
+    Periodogram(25.0, config["scale"], 0.0, config["context_ms"])
     for name in ("rows", "deterministic_order", "stochastic_order"):
         value, automatic = config[name], name != "rows"
         if not (automatic and value == "auto") and not (isinstance(value, int) and value >= 1):
             raise FacesynthError(f"{name} must be a whole number from 1{' or auto' if automatic else ''}; got {value!r}")
+    if config["fitted_to"] not in FITTED_TO:
+        raise unknown("fitted_to", config["fitted_to"], FITTED_TO)
     if config["lead_ms"] != "auto" and not isinstance(config["lead_ms"], int | float):
         raise FacesynthError(f"lead_ms must be a number of milliseconds or auto; got {config['lead_ms']!r}")

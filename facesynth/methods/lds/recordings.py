@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus
+from facesynth.inference.arrays import Ints
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.sound import resample
+from facesynth.inference.speech_state import frame_states
 from facesynth.motion.pca import Pca
 from facesynth.progress import track
 from facesynth.speech.periodogram import RATE, Periodogram
@@ -44,10 +47,7 @@ class Standardised(nn.Module):
     def fit(cls, frames: Sequence[NDArray[Any]], components: float, what: str) -> Self:
         """Learn from clips of frames [T, C]; FacesynthError where they are constant."""
         stacked = np.concatenate(frames)
-        if np.ptp(stacked, axis=0).max() <= 1e-9 * max(1.0, float(np.abs(stacked).max())):
-            raise FacesynthError(
-                f"{what} is the same in all {len(stacked)} frames: there is nothing to learn; check the recording"
-            )
+        require_change(stacked, what)
         pca = Pca.fit(stacked, components)
         encoded = pca.encode(torch.from_numpy(stacked).float())
         moving = encoded.std(dim=0) > 1e-6 * encoded.std(dim=0).max()
@@ -69,6 +69,12 @@ class Standardised(nn.Module):
         return self.pca.decode(components * self.scale)
 
 
+def require_change(frames: NDArray[Any], what: str) -> None:
+    """FacesynthError where frames [N, C] are all the same."""
+    if np.ptp(frames, axis=0).max() <= 1e-9 * max(1.0, float(np.abs(frames).max())):
+        raise FacesynthError(f"{what} is the same in all {len(frames)} frames: there is nothing to learn; check the recording")
+
+
 SHORTEST = 20
 """Frames: shorter pieces between gaps teach nothing."""
 
@@ -84,6 +90,10 @@ class Piece:
     """Frame of the utterance at which the piece begins."""
     frames: NDArray[np.float32]
     """[T, C] complete frames."""
+    states: Ints
+    """[T] what the mouth is busy with, see `inference.speech_state`."""
+    gaps: Sequence[float]
+    """How near the lips came at each p, b or m of the utterance."""
 
     @property
     def stop(self) -> int:
@@ -99,7 +109,11 @@ def pieces_of(corpus: Corpus) -> tuple[list[Piece], int]:
         audio = resample(utterance.speech.audio, utterance.speech.sample_rate, RATE)
         frames = utterance.motion.frames
         total += len(frames)
-        pieces += [Piece(utterance.sentence, audio, a, frames[a:b]) for a, b in _complete(frames) if b - a >= SHORTEST]
+        states = frame_states(utterance.speech.phones, utterance.motion.fps, len(frames))
+        spans = bilabial_spans(utterance.speech.phones, utterance.motion.fps)
+        gaps = narrowest_gaps(frames, corpus.layout, spans)
+        whole = [(a, b) for a, b in _complete(frames) if b - a >= SHORTEST]
+        pieces += [Piece(utterance.sentence, audio, a, frames[a:b], states[a:b], gaps) for a, b in whole]
     if not pieces:
         raise FacesynthError(f"no utterance of the corpus has {SHORTEST} complete frames in a row; check it with `corpus check`")
     return pieces, total - sum(len(piece.frames) for piece in pieces)
