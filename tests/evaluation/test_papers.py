@@ -1,19 +1,23 @@
 import csv
 import io
 
+import numpy as np
 import pytest
 from corpora import tiny_corpus
 from living_eyes import with_eyes
 from nodding import nodding_corpus
 
 from facesynth.config import load_config
-from facesynth.evaluation.papers import Material, deng2006_speech, reproduce, saisan2004
+from facesynth.corpus import Corpus, Record
+from facesynth.evaluation.papers import Material, deng2006_speech, reproduce, saisan2004, saisan2004_checks
 from facesynth.evaluation.papers.deng2006_eyes import EYES
 from facesynth.evaluation.papers.deng2006_head import HEAD
 from facesynth.evaluation.papers.deng2006_speech import DEGREES, SPEECH
 from facesynth.evaluation.papers.finding import Finding, Reproduction, not_available
 from facesynth.evaluation.papers.joined import joined, phones_until
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.coarticulation.method import Coarticulation
 from facesynth.methods.coarticulation.transitions import PENALTIES
 from facesynth.methods.efase import tuning
@@ -67,7 +71,26 @@ def test_saisan_2004_compares_with_the_mean_pose(corpus):
     assert len(errors) == 5
     assert all(error > 0 for error in errors.values())
     assert {one.where for one in result.findings if one.figure} == {"fig. 1", "fig. 3"}
-    assert [one.what for one in result.findings if one.comparable] == ["largest modulus of an eigenvalue (below 1: stable)"]
+    assert [one.where for one in result.findings if one.comparable] == [*4 * ["§3"], "§4"]
+    passed, of = by_what(result, "residuals that pass for white")[0].ours.split(" of ")
+    assert 0 <= int(passed) <= int(of)
+    half = by_what(result, "half of a recording")
+    assert [one.status for one in half] == ["not available"]
+    assert "a half of it must have 200" in half[0].why
+
+
+def test_half_of_a_recording_teaches_what_the_other_half_is_driven_by(tmp_path):
+    corpus = tiny_corpus(tmp_path / "one", utterances=12, fps=60)
+    frames = np.concatenate([u.motion.frames for u in corpus])
+    audio = np.concatenate([u.speech.audio[: round(len(u.motion) / 60 * u.speech.sample_rate)] for u in corpus])
+    seconds = len(frames) / 60
+    track = EmotionTrack.constant("neutral", seconds)
+    speech = Speech(audio, corpus[corpus.ids[0]].speech.sample_rate, PhoneTrack(("pau",), np.array([seconds])), track)
+    long = Corpus.create(tmp_path / "long", performer="x", layout=corpus.layout, fps=60, emotions=corpus.emotions)
+    long.add_utterance(Record("long"), speech, Motion(frames, 60, corpus.layout))
+    found = saisan2004_checks.halves(Material(long, long, long, 0), {**saisan2004.SETTINGS, "components": 4})
+    assert [one.what.rsplit(": ", 1)[1] for one in found] == ["mean pose", "deterministic part", "one sample"]
+    assert all(float(one.ours) > 0 for one in found)
 
 
 def test_cao_2005_says_what_a_corpus_without_emotions_cannot_give(corpus):

@@ -80,7 +80,8 @@ def test_without_second_takes_the_sentences_are_the_yardstick(corpus):
     firsts = corpus.subset([u.id for u in corpus if u.take == 1])
     model = AnimeGraph(variance=0.98).fit(firsts)
     assert model.facts["components"][0]["yardstick"] == "sentences"
-    assert any(row["is"] == "emotion" for row in model.facts["components"])
+    assert "by chance from sentence to sentence" in model.facts["findings"][0]
+    assert model.maps.find(0, 1) is not None
 
 
 @pytest.mark.parametrize("kernel", ["exponential", "gaussian"])

@@ -12,6 +12,7 @@ from facesynth.evaluation.papers import Material
 from facesynth.evaluation.papers.deng2008 import Spoken, Stated, trajectories
 from facesynth.evaluation.papers.figure import Figure, absent
 from facesynth.evaluation.papers.finding import Finding, values
+from facesynth.evaluation.papers.saisan2004_checks import assumptions, halves
 from facesynth.evaluation.trajectories import shown_channels
 from facesynth.inference.motion import Motion
 from facesynth.methods.lds.method import LDS
@@ -112,6 +113,8 @@ FIGURES: tuple[Figure, ...] = (
     absent(
         "fig. 4", "a synthesised video of the speaker", "pictures", "needs the speaker's video; `facesynth speak` makes one of it"
     ),
+    Figure("§6", "half of a recording to learn from, half to drive", "a curve", lambda material: halves(material, SETTINGS)),
+    Figure("§3", "white and independent residuals", "assumed", lambda material: assumptions(learned(material), material)),
     Figure("§4", "largest modulus of an eigenvalue", "below 1", poles),
 )
 """What the page shows, in the paper's order."""

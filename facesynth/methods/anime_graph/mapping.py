@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -144,7 +144,8 @@ def lasting_shift(samples: Sequence[Samples], split: Split) -> Floats:
 
     The paper copies the speech components. Emotions shift them a little all the same (a smile widens the mouth in
     every vowel), and copying them lost to adding the mean difference of two emotions. Where speech and emotion are mixed,
-    all components are shifted, and the map adds what depends on the pose.
+    all components are shifted, and a map adds what depends on the pose: far from all that it knows it is then the mean
+    difference, and no pose of speech is taken for one of an emotion.
     """
     shift = _average(samples, "shift")
     if not split.mixed:
@@ -152,14 +153,31 @@ def lasting_shift(samples: Sequence[Samples], split: Split) -> Floats:
     return shift
 
 
-def beside_shift(samples: Sequence[Samples], split: Split) -> Sequence[Samples]:
-    """What a map is to learn beside the lasting shift: everything, or where components are mixed, what is left of the
-    difference after the shift, each component's by its weight.
+def _beside_shift(samples: Sequence[Samples], split: Split) -> Sequence[Samples]:
+    """What a map is to learn beside the lasting shift: all of the emotional components' difference, or where they are mixed
+    what is left of it, of each by its weight.
     """
-    if not split.mixed:
-        return samples
     shift = lasting_shift(samples, split)[split.emotional]
     return [replace(s, target=s.source + split.weights * (s.target - s.source - shift)) for s in samples]
+
+
+class EmotionMap(NamedTuple):
+    """A map from one emotion to another."""
+
+    rbf: RbfMap
+    """Displacement of the emotional components, as a function of them."""
+    shift: Floats
+    """[D] what is added to all components beside."""
+    dropped: Floats
+    """[C] what is added to the frame outside of them."""
+
+
+def fit_emotion_map(
+    samples: Sequence[Samples], split: Split, settings: MapSettings, mixing: Floats, *, seed: int = 0
+) -> EmotionMap:
+    """The map that matched sentences teach; mixing [C, D] says what each component does."""
+    rbf = fit_map(_beside_shift(samples, split), settings, seed=seed)
+    return EmotionMap(rbf, lasting_shift(samples, split), dropped_shift(samples, mixing))
 
 
 def dropped_shift(samples: Sequence[Samples], mixing: Floats) -> Floats:

@@ -34,10 +34,7 @@ from facesynth.methods.anime_graph.mapping import (
     MapSettings,
     Samples,
     Width,
-    beside_shift,
-    dropped_shift,
-    fit_map,
-    lasting_shift,
+    fit_emotion_map,
     matched,
     require_pairs,
 )
@@ -192,9 +189,8 @@ class AnimeGraph(Method):
 
     def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:
         source, target = map(self.emotions.index, pair)
-        rbf = fit_map(beside_shift(samples, self.split), self.map_settings, seed=seed)
-        shift = lasting_shift(samples, self.split)
-        return FittedMap(source, target, rbf, shift, dropped_shift(samples, self.components.mixing.numpy()))
+        found = fit_emotion_map(samples, self.split, self.map_settings, self.components.mixing.numpy(), seed=seed)
+        return FittedMap(source, target, *found)
 
     def _split(self, takes: Sequence[Take], seed: int) -> Split:
         override = self.config["emotional_components"]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +13,16 @@ from facesynth.inference.layout import Layout
 from facesynth.methods.anime_graph.components import FaceComponents
 from facesynth.methods.anime_graph.mapping import (
     WIDTHS,
-    MapLearner,
+    EmotionMap,
     MapSettings,
-    Samples,
-    beside_shift,
-    dropped_shift,
-    fit_map,
-    lasting_shift,
+    fit_emotion_map,
     matched,
     require_pairs,
     require_sentences,
 )
 from facesynth.methods.anime_graph.parallel import Take, aligned, emotion_pairs
 from facesynth.methods.anime_graph.split import Split, split_components
-from facesynth.motion.rbf import KERNELS, RbfMap
+from facesynth.motion.rbf import KERNELS
 from facesynth.progress import track
 
 
@@ -147,7 +142,7 @@ class MapTrial:
             # One sentence cannot be left out of itself: its map takes the median width.
             fitting = settings if count > 1 else replace(settings, width="median")
             known = matched([pair for pair in pairs if pair[0].sentence in sentences[:count]], learned.split)
-            fitted = _fitted(learned, known, fit_map(beside_shift(known, learned.split), fitting, seed=seed))
+            fitted = fit_emotion_map(known, learned.split, fitting, learned.components.mixing.numpy(), seed=seed)
             errors = [self._error(learned, pair, fitted) for pair in pairs if pair[0].sentence in asked]
             curve[count] = float(np.mean(errors))
         return curve
@@ -180,27 +175,28 @@ class MapTrial:
         require_sentences(len(sentences), source, target)
         return sentences
 
-    def _maps(self, learned: Learned, known: Sequence[tuple[Take, Take]], seed: int) -> dict[str, "Fitted"]:
+    def _maps(self, learned: Learned, known: Sequence[tuple[Take, Take]], seed: int) -> dict[str, EmotionMap]:
         """By kernel and width."""
-        samples = matched(known, learned.split)
-        maps = MapLearner(beside_shift(samples, learned.split), self.centres, seed=seed)
-        named = {f"{kernel} {width}": (width, kernel) for kernel in KERNELS for width in WIDTHS}
-        return {name: _fitted(learned, samples, maps.fit(*named[name])) for name in self.kinds}
+        samples, mixing = matched(known, learned.split), learned.components.mixing.numpy()
+        named = {f"{kernel} {width}": MapSettings(width, kernel, self.centres) for kernel in KERNELS for width in WIDTHS}
+        return {name: fit_emotion_map(samples, learned.split, named[name], mixing, seed=seed) for name in self.kinds}
 
     def _mean_difference(self, learned: Learned, known: Sequence[tuple[Take, Take]]) -> Floats:
         return np.concatenate([_truth(learned, a, b) - a.frames for a, b in known]).mean(axis=0)
 
-    def _errors(self, learned: Learned, pair: tuple[Take, Take], maps: Mapping[str, "Fitted"], mean: Floats) -> dict[str, float]:
+    def _errors(
+        self, learned: Learned, pair: tuple[Take, Take], maps: Mapping[str, EmotionMap], mean: Floats
+    ) -> dict[str, float]:
         a, b = pair
         truth = _truth(learned, a, b)
         plain = {"unchanged": a.frames.astype(np.float64), "mean difference": a.frames + mean}
         errors = {name: unit_cube_rms(guess, truth, self.layout) for name, guess in plain.items()}
         return errors | {name: self._error(learned, pair, fitted) for name, fitted in maps.items()}
 
-    def _error(self, learned: Learned, pair: tuple[Take, Take], fitted: "Fitted") -> float:
+    def _error(self, learned: Learned, pair: tuple[Take, Take], fitted: EmotionMap) -> float:
         return unit_cube_rms(self.mapped(learned, pair[0], fitted), _truth(learned, *pair), self.layout)
 
-    def mapped(self, learned: Learned, take: Take, fitted: "Fitted") -> Floats:
+    def mapped(self, learned: Learned, take: Take, fitted: EmotionMap) -> Floats:
         """[T, C] a recording, mapped."""
         import torch
 
@@ -209,20 +205,6 @@ class MapTrial:
         change[:, emotional] += fitted.rbf(torch.from_numpy(take.components[:, emotional])).numpy()
         moved = take.frames + change @ learned.components.mixing.numpy().T + fitted.dropped
         return keep_shut(moved, take.frames.astype(np.float64), self.layout)
-
-
-class Fitted(NamedTuple):
-    """A map from one emotion to another."""
-
-    rbf: RbfMap
-    shift: Floats
-    """[D]"""
-    dropped: Floats
-    """[C]"""
-
-
-def _fitted(learned: Learned, samples: Sequence[Samples], rbf: RbfMap) -> Fitted:
-    return Fitted(rbf, lasting_shift(samples, learned.split), dropped_shift(samples, learned.components.mixing.numpy()))
 
 
 def _truth(learned: Learned, a: Take, b: Take) -> Floats:

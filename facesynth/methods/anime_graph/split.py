@@ -3,8 +3,8 @@
 Decided by evidence: that emotions change a component more than another take of the same emotion does is tested by
 permutation, and of the components that pass, as many as are wrong by chance are expected to be a twentieth (false discovery
 rate, Benjamini and Hochberg 1995). What share of the change is the emotion's, 1 - (takes' / emotions')², says whether
-such a component carries emotion and little else. Where none does, because each carries speech too, all are mapped, each by
-its share, so that the speech ones change little more than on average.
+such a component carries emotion and little else. Where these do not hold nearly all of what emotions change, because the
+others carry both, all are mapped, each by its share, so that the speech ones change little more than on average.
 """
 
 from collections.abc import Sequence
@@ -28,6 +28,9 @@ SHARE = 0.75
 emotions change it twice as much (RMS) …"""
 DISCOVERY = 0.05
 """… and it is among components of which so many are expected to be found by chance."""
+HELD = 0.9
+"""Emotional components are told from speech when they hold this share of what emotions change (mm², beyond what takes do);
+where they hold less, speech and emotion are mixed."""
 MOUTH_SHARE = 0.02
 """A component is speech when it explains this share of the mouth's motion within sentences."""
 MOSTLY_SPEECH = 0.25
@@ -54,8 +57,10 @@ class Split:
     speech: NDArray[np.int64]
     yardstick: str
     """`takes`, or, in corpora without second takes, `sentences`."""
+    held: float = 0.0
+    """Share of what emotions change beyond takes, in the layout's unit squared, that the emotional components hold."""
     mixed: bool = False
-    """Whether emotions change components, but none of them is emotional and little else."""
+    """Whether emotions change components, but those that are emotional and little else do not hold nearly all of it."""
 
     @cached_property
     def emotion_share(self) -> Floats:
@@ -64,7 +69,7 @@ class Split:
 
     @property
     def weights(self) -> Floats:
-        """[E] how much of the emotional components' change depends on the pose: all, or where they are mixed the share."""
+        """[E] how much of what the pose says of a change is taken: all, or where components are mixed the emotion's share."""
         return self.emotion_share[self.emotional] if self.mixed else np.ones(len(self.emotional))
 
     def summary(self) -> str:
@@ -77,15 +82,17 @@ class Split:
             f"{changed} of {count} components change with emotion more than {than} (false discovery rate below {DISCOVERY:g})"
         )
         if self.mixed:
-            most = float(self.emotion_share[self.discovery < DISCOVERY].max())
             return (
-                f"{evidence}, but none is emotional and little else (at most {most:.0%} of a difference is the emotion's, or it "
-                f"moves the mouth): all are mapped, those of speech weighted down"
+                f"{evidence}, but those that are emotional and little else hold {self.held:.0%} of what emotions change: speech "
+                "and emotion are mixed, so all components are mapped, those of speech weighted down"
             )
         if not len(self.emotional):
             return f"{evidence}: there is nothing to map"
         names = ", ".join(map(str, self.emotional.tolist()))
-        return f"{evidence}; emotion maps change {len(self.emotional)} of them ({names}) and shift the others by the mean"
+        return (
+            f"{evidence}; {len(self.emotional)} of them ({names}) are emotional and hold {self.held:.0%} of what emotions "
+            "change: maps change these, and shift the others by the mean"
+        )
 
     def report(self, blocks: Sequence[str], block: Sequence[int]) -> list[dict[str, Any]]:
         """One row for each component, for people and for JSON."""
@@ -126,26 +133,29 @@ def split_components(
     between = _differences(_some([p for a, b in _emotion_names(takes) for p in emotion_pairs(takes, a, b)]), by)
     within = _differences(_some(retakes(takes)), by)
     rng = np.random.default_rng(seed)
+    offsets = np.array([d.mean(axis=0) for d in between])
     if len(within) >= 2:
         ratio, chance = _against_takes(_squares(between), _squares(within), rng)
     else:
-        ratio, chance = _against_sentences(np.array([d.mean(axis=0) for d in between]), rng)
+        ratio, chance = _against_sentences(offsets, rng)
     discovery = false_discovery_control(chance)
     scored = Split(ratio, chance, discovery, share, _NONE, by, "takes" if len(within) >= 2 else "sentences")
-    emotional, mixed = _emotional(scored) if override is None else (_named(override, components.count), False)
+    pure = _pure(scored) if override is None else _named(override, components.count)
+    changes = scored.emotion_share * (_squares(between) if len(within) >= 2 else np.square(offsets)).mean(axis=0)
+    changes = changes * np.square(components.mixing.numpy()).sum(axis=0)
+    held = float(changes[pure].sum() / max(changes.sum(), 1e-12))
+    mixed = override is None and held < HELD and bool((discovery < DISCOVERY).any())
+    emotional = np.arange(components.count) if mixed else pure
     speech = by if mixed else np.setdiff1d(by, emotional)
     if not len(speech):
         speech = np.setdiff1d(np.arange(components.count), emotional)[:1]
-    return replace(scored, emotional=emotional, speech=speech, mixed=mixed)
+    return replace(scored, emotional=emotional, speech=speech, held=held, mixed=mixed)
 
 
-def _emotional(scored: Split) -> tuple[NDArray[np.int64], bool]:
-    """The components that maps change, and whether they are all of them for want of purely emotional ones."""
-    found = scored.discovery < DISCOVERY
-    pure = np.flatnonzero(found & (scored.emotion_share >= SHARE) & (scored.mouth_share <= MOSTLY_SPEECH))
-    if len(pure) or not found.any():
-        return pure, False
-    return np.arange(len(found)), True
+def _pure(scored: Split) -> NDArray[np.int64]:
+    """The components that are emotional and little else."""
+    clear = (scored.discovery < DISCOVERY) & (scored.emotion_share >= SHARE)
+    return np.flatnonzero(clear & (scored.mouth_share <= MOSTLY_SPEECH))
 
 
 def _named(override: Sequence[int], count: int) -> NDArray[np.int64]:
