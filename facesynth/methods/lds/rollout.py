@@ -43,7 +43,9 @@ class Rollout(nn.Module):
         C = np.hstack([deterministic.C, stochastic.C])
         D = np.hstack([deterministic.D, np.eye(len(C))])
         noisy = np.repeat([0.0, 1.0], [deterministic.order, stochastic.order])
-        return cls(*(torch.from_numpy(matrix.astype(np.float32)) for matrix in (A, B, C, D, np.ones(len(C)), noisy)))
+        return cls(
+            *(torch.from_numpy(np.ascontiguousarray(matrix, np.float32)) for matrix in (A, B, C, D, np.ones(len(C)), noisy))
+        )
 
     @property
     def shown(self) -> tuple[Tensor, Tensor]:
@@ -52,7 +54,7 @@ class Rollout(nn.Module):
             return self.C, self.D
         less = self.gains[:, None] - 1
         of_noise = torch.cat([self.D.new_zeros(self.D.shape[1] - len(self.gains)), self.D.new_ones(len(self.gains))])
-        return self.C * (1 + less * self.noisy), self.D * (1 + less * of_noise)
+        return (self.C * (1 + less * self.noisy)).contiguous(), (self.D * (1 + less * of_noise)).contiguous()
 
     def rest(self) -> Tensor:
         """[n] the state of a face whose inputs have been average for long: zero."""
