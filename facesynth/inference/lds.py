@@ -74,9 +74,9 @@ class LdsSettings:
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:
         """From a manifest's settings, which may hold more."""
         window, lead_ms, settling_s = int(plain["window_samples"]), float(plain["lead_ms"]), float(plain["settling_s"])
-        sizes = (int(plain[name]) for name in ("features", "components", "states"))
+        features, components, states = (int(plain[name]) for name in ("features", "components", "states"))
         amounts = {name: float(plain["noise_amounts"][name]) for name in STATES}
-        return cls(window, lead_ms, settling_s, *sizes, amounts, plain["closed_gap"])
+        return cls(window, lead_ms, settling_s, features, components, states, amounts, plain["closed_gap"])
 
     def windows(self, fps: float, rate: int) -> FrameWindows:
         """Of sound at a rate in Hz, for frames at `fps`."""
@@ -124,8 +124,9 @@ class Lds:
         frames, _ = self._frames(state, count, amounts_along(self.settings.noise_amounts, speech.phones, self.fps, count))
         if self.settings.closed_gap is not None:
             spans = bilabial_spans(speech.phones, self.fps)
-            frames = close_at(frames.astype(np.float64), self.layout, spans, self.settings.closed_gap, self.fps)
-        return Motion(frames.astype(np.float32), self.fps, self.layout)
+            closed = close_at(frames.astype(np.float64), self.layout, spans, self.settings.closed_gap, self.fps)
+            frames = closed.astype(np.float32)
+        return Motion(frames, self.fps, self.layout)
 
     def start(self, *, seed: int = 0, noise: float = 1.0) -> LdsState:
         """The state before the first sample: the noise has already run for some seconds."""

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats
-from .contours import HOP, RATE, Contours, FrontEnd, contours
-from .ear import FRAMES_PER_S, Ear
+from .contours import HOP, Contours, FrontEnd, contours
+from .ear import FRAMES_PER_S, RATE, Ear
 from .graphs import Part
 
 PERCENTILES = (10, 50, 90)

@@ -34,10 +34,10 @@ def halves(material: Material, settings: dict[str, object]) -> list[Finding]:
     first, second = part_of(longest, 0, middle), part_of(longest, middle, len(longest.motion))
     with TemporaryDirectory() as folder:
         model = LDS(**settings).fit(_alone(Path(folder) / "half", first, material.corpus), seed=material.seed)  # type: ignore[arg-type]
-    truth = second.motion.frames
+    truth = second.motion.frames.astype(np.float64)
     guesses = {"mean pose": np.broadcast_to(np.nanmean(first.motion.frames, axis=0), truth.shape)}
     for noise, name in ((0.0, "deterministic part"), (1.0, "one sample")):
-        guesses[name] = model.synthesize(second.speech, seed=material.seed, noise=noise).frames[: len(truth)]
+        guesses[name] = model.synthesize(second.speech, seed=material.seed, noise=noise).frames[: len(truth)].astype(np.float64)
     unit, why = material.corpus.layout.unit, f"the paper prints a curve of one point, in pixels; {material.unlike}"
     what = f"{middle} frames to learn from, the sound of {len(truth)} to drive, RMS error per coordinate, {unit}"
     return [Finding("§6", f"{what}: {name}", "a curve", f"{_rms(g, truth):.3g}", False, why) for name, g in guesses.items()]
@@ -62,7 +62,7 @@ def assumptions(model: LDS, material: Material) -> list[Finding]:
     together = np.concatenate(clips)
     sources = np.linalg.solve(model.innovations.mixing.double().numpy(), together.T).T
     white = [ljung_box([clip[:, k] for clip in clips]) for k in range(together.shape[1])]
-    first = [float(np.corrcoef(*(np.concatenate(side) for side in _neighbours(clips, k)))[0, 1]) for k in range(len(white))]
+    first = [_correlation(*_neighbours(clips, k)) for k in range(len(white))]
     passed = f"{sum(chance > 0.05 for _, chance in white)} of {len(white)}"
     why = "the paper assumes it and prints no test"
     found = [
@@ -91,6 +91,10 @@ def residuals(model: LDS, utterance: Utterance) -> Floats:
 def _neighbours(clips: list[Floats], component: int) -> tuple[list[Floats], list[Floats]]:
     pairs = [(clip[:-1, component], clip[1:, component]) for clip in clips]
     return [one for one, _ in pairs], [other for _, other in pairs]
+
+
+def _correlation(one: list[Floats], other: list[Floats]) -> float:
+    return float(np.corrcoef(np.concatenate(one), np.concatenate(other))[0, 1])
 
 
 def _alone(path: Path, utterance: Utterance, like: Corpus) -> Corpus:

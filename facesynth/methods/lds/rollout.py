@@ -34,7 +34,8 @@ class Rollout(nn.Module):
     @classmethod
     def empty(cls) -> Self:
         """One without content, for `load` to fill."""
-        return cls(*(torch.zeros(0, 0) for _ in range(4)), torch.zeros(0), torch.zeros(0))
+        empty, none = torch.zeros(0, 0), torch.zeros(0)
+        return cls(empty, empty, empty, empty, none, none)
 
     @classmethod
     def of(cls, deterministic: Deterministic, stochastic: Stochastic) -> Self:
