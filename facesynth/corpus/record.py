@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 from facesynth.atomic import write_text
 from facesynth.corpus.files import check_id
+from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError, unknown
 
 Split = Literal["train", "test", ""]
@@ -80,9 +81,15 @@ def read_records(path: Path) -> dict[str, Record]:
 
 
 def read_listed(path: Path) -> dict[str, dict[str, Any]]:
-    """What a table like utterances.csv states of recordings, by their name; an empty cell states nothing."""
-    records = read_records(path)
-    rows = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline=""))
+    """What a table like utterances.csv, in any encoding, states of recordings, by name; an empty cell states nothing."""
+    try:
+        text = text_of(path)
+        records, faults = _parsed(csv.DictReader(io.StringIO(text, newline=""), strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FacesynthError(f"{path} cannot be read as CSV ({error}); export it again") from None
+    if faults:
+        raise FacesynthError(f"{path}{faults[0]}")
+    rows = csv.DictReader(io.StringIO(text, newline=""))
     stated = {row["id"]: [name for name, value in row.items() if value.strip() and name in STATED] for row in rows}
     return {name: {field: getattr(record, field) for field in stated[name]} for name, record in records.items()}
 

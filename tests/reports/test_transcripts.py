@@ -7,6 +7,7 @@ import pytest
 from bringing import added, corpus_of, lay_down, run, spoken, talker
 
 from facesynth.corpus.add.transcripts import is_table, read_transcripts
+from facesynth.corpus.record import read_listed
 from facesynth.inference.phones import PHONES
 from facesynth.speech.pronunciation import pronunciations
 from facesynth.speech.transcript import left_out, words_of
@@ -84,14 +85,16 @@ def test_a_guessed_encoding_is_told_wherever_words_are_given(tmp_path):
     sound = lay_down(clips, "a", 3.0)
     words = tmp_path / "words.txt"
     words.write_bytes("Frédéric déjà".encode("cp1252"))
-    (tmp_path / "words.csv").write_bytes("id,text\na,Frédéric déjà\n".encode("cp1252"))
+    table = tmp_path / "words.csv"
+    table.write_bytes("id,text\na,Frédéric déjà\n".encode("cp1252"))
     phones = tmp_path / "a.lab"
     phones.write_text("1.5 aa\n3.0 pau\n", encoding="utf-8")
     told = "is not UTF-8; it was read as Latin-1"
-    for given in (words, tmp_path / "words.csv"):
-        report, _ = added(corpus_of(tmp_path), clips, "--phones", phones, "--text-file", given, "--replace")
+    for option, given in (("--text-file", words), ("--text-file", table), ("--list", table)):
+        report, _ = added(corpus_of(tmp_path), clips, "--phones", phones, option, given, "--replace")
         assert [line for line in report["guessed"] if told in line], report
-        (tmp_path / "corpus").rename(tmp_path / given.name.replace(".", "_"))
+        assert read_listed(tmp_path / "corpus" / "utterances.csv")["a"]["text"] == "Frédéric déjà"
+        (tmp_path / "corpus").rename(tmp_path / f"{option[2:]}_{given.suffix[1:]}")
     (clips / "list.csv").write_bytes("id,text\na,Frédéric déjà\n".encode("cp1252"))
     report, _ = added(corpus_of(tmp_path), clips, "--phones", phones)
     assert [line for line in report["remarks"]["list.csv"] if told in line]
