@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 
 from facesynth.corpus import Corpus, Utterance
+from facesynth.device import device_of
 from facesynth.evaluation.lips import lip_opening
 from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import MIDDLE_LIPS, LipGap
@@ -62,14 +63,16 @@ def main() -> None:
     parser.add_argument("table", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--limit", type=int, default=120)
+    parser.add_argument("--device", default="auto", help="auto, cpu, cuda or mps")
     options = parser.parse_args()
     corpus, table = Corpus.open(options.corpus), read_targets(options.table.read_text(encoding="utf-8"))
-    clips = [clip_of(corpus[name], list(table)) for name in corpus.ids[: options.limit]]
-    clips = [clip for clip in clips if torch.isfinite(clip.seen_mm).all()]
-    fit = Fit(table)
-    print(f"correlation of openings in {len(clips[::4])} recordings that are left out: {fit.judged(clips[::4]):.3f}")
-    fit.learn([clip for number, clip in enumerate(clips) if number % 4])
-    print(f"after calibration: {fit.judged(clips[::4]):.3f}")
+    with device_of(options.device):
+        clips = [clip_of(corpus[name], list(table)) for name in corpus.ids[: options.limit]]
+        clips = [clip for clip in clips if torch.isfinite(clip.seen_mm).all()]
+        fit = Fit(table)
+        print(f"correlation of openings in {len(clips[::4])} recordings that are left out: {fit.judged(clips[::4]):.3f}")
+        fit.learn([clip for number, clip in enumerate(clips) if number % 4])
+        print(f"after calibration: {fit.judged(clips[::4]):.3f}")
     print({name: round(value, 4) for name, value in fit.constants().items()})
     write(options.table, options.output, fit)
 
@@ -168,7 +171,7 @@ class Fit(torch.nn.Module):
     @torch.no_grad()
     def judged(self, clips: list[Clip]) -> float:
         """Mean correlation with the openings that were seen."""
-        return float(np.mean([correlation(self(clip)[clip.spoken], clip.seen_mm[clip.spoken]) for clip in clips]))
+        return float(np.mean([float(correlation(self(clip)[clip.spoken], clip.seen_mm[clip.spoken])) for clip in clips]))
 
 
 def correlation(mine: Tensor, yours: Tensor) -> Tensor:
@@ -203,7 +206,7 @@ def write(table: Path, output: Path, fit: Fit) -> None:
     """The table with the openings and dominances of a fit; contacts and rests stay as they are."""
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     known = read_targets(table.read_text(encoding="utf-8"))
-    opening, dominance = fit.factors().detach().numpy()
+    opening, dominance = fit.factors().detach().cpu().numpy()
     for number, row in enumerate(rows):
         if row["closes"] in ("lips", "rest"):
             continue

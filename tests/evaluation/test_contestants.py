@@ -2,6 +2,7 @@ import pytest
 
 from facesynth.evaluation.contestants import Contestant, by_minutes, check_labels, contestant, read_family, references
 from facesynth.inference.errors import FacesynthError
+from facesynth.methods.lds.method import LDS
 
 
 def test_a_method_by_name_or_by_settings_file(repository):
@@ -17,7 +18,7 @@ def test_a_method_by_name_or_by_settings_file(repository):
 
 
 def test_what_decides_the_predictions_includes_defaults():
-    assert Contestant("a", "lds").plain()["settings"]["features"] == 8
+    assert Contestant("a", "lds").plain()["settings"]["features"] == LDS().config["features"]
     assert Contestant("a", "lds", {"features": 4}).plain() != Contestant("a", "lds").plain()
     assert Contestant("a", "lds", speak={"noise": 0}).plain() != Contestant("a", "lds").plain()
 
