@@ -20,6 +20,8 @@ from facesynth.studio.document import Document, Take
 PHONES, EMOTIONS, CONSTRAINTS = "phones.TextGrid", "emotions.csv", "constraints.csv"
 OF_REQUEST = ("seed", "mouth", "head", "eyes", "size")
 """What of `Request` a take may ask for, beside the model's own options."""
+WHY = ".json"
+"""Of the file that says why each phone got its motion."""
 PINS, NODES = "constraints", "edits"
 """Own options of models that take nodes from a person: which must be used, and which were removed or drawn."""
 
@@ -114,7 +116,7 @@ def arguments(model: Path, sound: Path, request: Request, take: Take, outputs: S
     words += _flags({name: value for name in ("rig", "mapping") if (value := getattr(request, name)) is not None})
     words += _flags(request.own)
     words += _flags({name: value for name, value in take.options if name in OF_REQUEST})
-    return [*words, *(word for output in outputs for word in ("-o", str(output)))]
+    return [*words, *(word for output in outputs for word in ("--explain" if output.suffix == WHY else "-o", str(output)))]
 
 
 def _as_it_is(value: Any) -> Any:

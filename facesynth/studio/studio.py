@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.speech import EmotionTrack, Speech
+from facesynth.methods.capabilities import Explaining
 from facesynth.methods.registry import known_capabilities, load, method_class
 from facesynth.speech.hearing import hear
 from facesynth.stage.performance import OUTPUTS
@@ -20,7 +21,7 @@ from facesynth.studio.messages import project_facts
 from facesynth.studio.node_maps import NodeMaps
 from facesynth.studio.performing import Performing, Shown, model_facts
 from facesynth.studio.project import NODES, Kept, Project
-from facesynth.studio.speak_files import arguments, request_of
+from facesynth.studio.speak_files import WHY, arguments, request_of
 
 REPORTS = "reports"
 LOOK_EVERY_S = 2.0
@@ -78,7 +79,7 @@ class Studio:
         }
         facts |= {
             "corpus": corpus_facts(self.corpus),
-            "outputs": OUTPUTS,
+            "outputs": self._outputs(),
             "methods": mouths(),
             "markers": self.performing.markers() if self.performing else [],
             "jobs": [job.facts() for job in self.jobs.known],
@@ -144,8 +145,10 @@ class Studio:
     def export(self, line: str, take: str, suffixes: list[str]) -> Job:
         """Let the command line speak the take's files into files of the project."""
         performing, folder = self.require_performing(), self.project.folder
-        if not suffixes or not set(suffixes) <= set(OUTPUTS):
-            raise FacesynthError(f"what can be exported is {', '.join(OUTPUTS)}; got {', '.join(suffixes) or 'nothing'}")
+        possible = self._outputs()
+        if not set(suffixes) & set(OUTPUTS) or not set(suffixes) <= set(possible):
+            also = f" ({WHY} beside another)" if WHY in possible else ""
+            raise FacesynthError(f"what can be exported is {', '.join(possible)}{also}; got {', '.join(suffixes) or 'nothing'}")
         said = self.project.document.line(line).take(take)
         request = request_of(
             said, self.project.take_folder(line, take), self.project.edits, performing.model.capabilities, performing.request
@@ -193,6 +196,11 @@ class Studio:
         self._seen = signature(self.corpus.path, path)
         self.project.keep_facts(model=path)
         await self.tell_all(self.facts())
+
+    def _outputs(self) -> tuple[str, ...]:
+        """Suffixes of what can be exported."""
+        told = self.performing is not None and Explaining in self.performing.model.capabilities.abilities
+        return (*OUTPUTS, WHY) if told else OUTPUTS
 
     def _model_path(self) -> Path:
         if self.model is None:

@@ -34,6 +34,7 @@ def test_the_whole_way_by_mouse_and_keyboard(shop, window, tmp_path):
     page = window()
     page.load_a_line("s00_neutral_t1")
     move_a_boundary(page)
+    compare_takes(page)
     half_angry(page)
     constrain_from_the_map(page)
     remove_a_node(page)
@@ -74,8 +75,10 @@ def constrain_from_the_map(page):
     """With the mouse: hovering shows the pose, a click plays the node, a drag onto the timeline constrains it there."""
     phones = page.take()["phones"]
     middle_s = sum(row[1] for row in phones[2:4]) / 2
-    page.page.mouse.click(*page.place(middle_s, "phones"))
+    page.page.mouse.click(*page.place(middle_s, "wave"))  # the playhead alone
     page.until(f"facesynth.map.state().map?.phone === '{phones[3][0]}' && facesynth.map.state().marks !== null")
+    assert page.see("facesynth.store.phone") == 3
+    filter_by_utterance(page)
     used = page.see("facesynth.store.choices[3].node")
     node = next(one for one in page.see("facesynth.map.state().map.nodes") if one != used)
     start = page.see(f"facesynth.map.placeOf('{node}')")
@@ -88,6 +91,32 @@ def constrain_from_the_map(page):
     assert page.take()["pins"] == [[3, node]]
     page.until_settled()
     assert page.see("facesynth.store.choices[3].node") == node
+
+
+def filter_by_utterance(page):
+    """Of the map's nodes those of one recording are left."""
+    utterance = page.see("facesynth.map.state().map.nodes[0].split(':')[0]")
+    page.page.select_option("#map-utterance", utterance)
+    shown = "facesynth.map.state().map.nodes.filter((_, k) => facesynth.map.state().map.shown[k])"
+    page.until(f"{shown}.every((node) => node.startsWith('{utterance}:')) && {shown}.length > 0")
+    page.page.select_option("#map-utterance", "")
+    page.until(f"{shown}.length === facesynth.map.state().map.nodes.length && facesynth.map.state().marks !== null")
+
+
+def compare_takes(page):
+    """Of three takes each can be seen over the one that is shown."""
+    for take in ("2", "3"):
+        page.after(lambda: page.page.click("#new-take"))
+        page.until(f"facesynth.store.take === '{take}'")
+    page.until_settled()
+    assert page.page.locator("#ghost option").all_inner_texts()[-2:] == ["take 1", "take 2"]
+    page.page.select_option("#ghost", "take:1")
+    page.until("facesynth.store.compared !== null && facesynth.face.pale !== undefined")
+    page.page.select_option("#take", "1")
+    page.until("facesynth.store.take === '1'")
+    assert page.page.input_value("#ghost") == ""
+    assert page.see("facesynth.store.compared") is None
+    page.until_settled()
 
 
 def remove_a_node(page):
@@ -135,6 +164,7 @@ def export(page, project):
     page.page.fill("#option-size", SIZE)
     page.after(lambda: page.page.keyboard.press("Tab"))
     page.page.click("#export")
+    page.page.check('#export-kinds [value=".json"]')
     page.page.click("#export-start")
     exporting = "[...facesynth.store.jobs.values()].find((job) => job.title.startsWith('export'))"
     page.until(f"({exporting}?.code ?? null) !== null", within_s=400)
@@ -148,7 +178,7 @@ def export(page, project):
         path = project / "exports" / name
         assert Path(download.value.path()).read_bytes() == path.read_bytes()
         exported.append(path)
-    assert {path.suffix for path in exported} == {".mp4", ".csv"}
+    assert {path.suffix for path in exported} == {".mp4", ".csv", ".json"}
     page.page.keyboard.press("Escape")
     return job["command"], exported
 

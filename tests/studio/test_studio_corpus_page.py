@@ -1,5 +1,7 @@
 """The page of the corpus in a real browser: what is wrong is told, transcripts are corrected, models are trained and judged."""
 
+import json
+
 import pytest
 from browsing import Page, started
 from corpora import tiny_corpus
@@ -56,13 +58,25 @@ def test_what_was_removed_is_kept_in_the_corpus_and_markers_move(window, shop):
     node, phone = page.see("[facesynth.store.choices[2].node, facesynth.store.choices[2].node_phone]")
     page.see(f"facesynth.map.lookAt('{phone}', '{node}')")
     page.until(f"facesynth.map.state().chosen === '{node}'")
+    page.page.click("#map-where")
+    page.until(f"facesynth.store.recording?.utterance === '{node.split(':')[0]}'")
     page.after(lambda: page.page.click("#map-remove"))
     page.page.click("#show-nodes")
+    suspicious_ones_are_listed_without_those_that_are_removed(page, node)
     page.page.click("#keep-edits")
     said(page, "in the corpus now")
     assert node in Journal(shop / "actor" / "edits.jsonl").removed()
     page.page.click("#keep-edits")
     said(page, "has all of these edits already")
+    page.after(lambda: page.page.click(f'[aria-label="Restore {node}"]'))
+    assert node not in page.see("facesynth.store.project.removed")
+
+
+def suspicious_ones_are_listed_without_those_that_are_removed(page, removed):
+    found = [one["node"] for one in json.loads(job(page, "#find-suspects")["output"])["suspects"]]
+    listed = page.page.locator('#inspector [aria-label^="Look at "]').all_inner_texts()
+    assert listed == [node for node in found if node != removed]
+    assert listed or "none is left" in page.page.inner_text("#inspector")
 
 
 def markers_lie_on_the_face_and_have_curves(page):

@@ -21,7 +21,7 @@ export function begin() {
 
 const MEANT = {
   ".mp4": "video with sound", ".csv": "weights, head and eyes as Live Link Face writes them", ".glb": "the head with its animation",
-  ".npz": "the motion as arrays", ".bvh": "the turns of the head",
+  ".npz": "the motion as arrays", ".bvh": "the turns of the head", ".json": "beside the others: why each phone got its motion",
 };
 
 function open() {
@@ -55,6 +55,6 @@ function lastSaid({ code, lines, output }) {
 }
 
 function exported(command) {
-  const names = [...command.matchAll(/-o (?:'([^']+)'|(\S+))/g)].map((found) => (found[1] ?? found[2]).split("/").at(-1));
+  const names = [...command.matchAll(/(?:-o|--explain) (?:'([^']+)'|(\S+))/g)].map((found) => (found[1] ?? found[2]).split("/").at(-1));
   return names.map((name) => make("div", {}, make("a", { href: `/exports/${encodeURIComponent(name)}`, download: name, textContent: name })));
 }

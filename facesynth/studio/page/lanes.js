@@ -164,13 +164,14 @@ function readerOf(name, names) {
 }
 
 export function drawCurve(c, lane, name) {
-  const drawn = [[store.recording?.utterance && store.recording.own ? store.recording : null, COLOURS.good], [store.before, COLOURS.ghost], [store.motion, COLOURS.text]];
+  const drawn = [[store.recording?.utterance && store.recording.own ? store.recording : null, COLOURS.good, [2, 3]], [store.compared ?? store.before, COLOURS.ghost, [7, 3]], [store.motion, COLOURS.text, []]];
   c.strokeStyle = COLOURS.edge;
   line(c, 0, lane.top, view.width, lane.top);
-  for (const [motion, colour] of drawn) {
+  for (const [motion, colour, dashes] of drawn) {
     const read = motion && readerOf(name, motion.names);
     if (!read) continue;
     c.strokeStyle = colour;
+    c.setLineDash(dashes);
     c.beginPath();
     for (let pixel = 0; pixel <= view.width; pixel += 2) {
       const value = Math.min(Math.max(valueAt(motion, at(pixel), read), 0), 1);
@@ -178,6 +179,7 @@ export function drawCurve(c, lane, name) {
     }
     c.stroke();
   }
+  c.setLineDash([]);
 }
 
 /** The intervals of [label, end, …] rows that are in sight: number, label, start, end. */

@@ -31,8 +31,14 @@ async function begin() {
   watch("time", () => (byId("clock").textContent = `${sound.time().toFixed(3)} s`));
   watch("time", run);
   watch("choice project", lists);
-  watch("choice", () => Promise.resolve(sound.loadLine()).then(beginning).then(timeline.draw));
+  watch("choice", () => Promise.resolve(sound.loadLine()).then(loaded));
   connect();
+}
+
+function loaded() {
+  byId("loop").checked = sound.loop.on;
+  beginning();
+  timeline.draw();
 }
 
 function listen() {
@@ -74,6 +80,7 @@ function markers() {
 function heardFace(message) {
   if (message.line === undefined || message.line !== store.line) return;
   if (message.ghost) {
+    if (byId("ghost").value !== `take:${message.take}`) return undefined;
     store.compared = motionOf(message);
     return changed("motion");
   }
@@ -104,7 +111,7 @@ function pose() {
   else face.pose(row, store.motion.names);
   const wanted = byId("ghost").value;
   const own = store.recording?.own ? store.recording : null;
-  const pale = { before: store.before, recording: own, take: store.compared }[wanted];
+  const pale = store.compared ?? { before: store.before, recording: own }[wanted];
   if (pale || face.pale) face.ghost(pale ? rowAt(pale, time) : null, pale?.names);
   const heat = byId("heat").checked;
   if (heat || face.heated) face.heat(heat && own ? row : null, own ? rowAt(own, time) : null);
@@ -136,7 +143,18 @@ function lists() {
   byId("take").replaceChildren(...takes.map((take) => new Option(take.name, take.name, false, take.name === store.take)));
   byId("undo").disabled = !store.project.can_undo;
   byId("redo").disabled = !store.project.can_redo;
+  ghosts(takes);
   for (const id of ["new-take", "remove-take", "play", "export"]) byId(id).disabled = !store.line;
+}
+
+/** Any other take of the line can be seen over the face. */
+function ghosts(takes) {
+  const list = byId("ghost");
+  const chosen = list.value;
+  for (const old of [...list.options].filter((one) => one.value.startsWith("take:"))) old.remove();
+  for (const { name } of takes) if (name !== store.take) list.add(new Option(`take ${name}`, `take:${name}`));
+  list.value = [...list.options].some((one) => one.value === chosen) ? chosen : "";
+  if (list.value !== chosen || (chosen.startsWith("take:") && !store.compared)) ghostChosen();
 }
 
 function buttons() {
@@ -168,12 +186,10 @@ function buttons() {
 }
 
 function ghostChosen() {
-  const others = (currentLine()?.takes ?? []).filter((take) => take.name !== store.take);
-  if (byId("ghost").value === "take") {
-    if (others.length) ask("compare", { line: store.line, take: others.at(-1).name }).catch((error) => say(error.message, true));
-    else say("this line has one take alone", true);
-  }
-  pose();
+  const [, take] = /^take:(.+)$/.exec(byId("ghost").value) ?? [];
+  if (take) return void ask("compare", { line: store.line, take }).catch((error) => say(error.message, true));
+  store.compared = null;
+  return changed("motion");
 }
 
 function turnTo(page) {

@@ -13,6 +13,8 @@ const context = canvas.getContext("2d");
 const phoneList = document.getElementById("map-phone");
 const kindList = document.getElementById("map-kind");
 const emotionList = document.getElementById("map-emotion");
+const utteranceList = document.getElementById("map-utterance");
+const lists = [phoneList, kindList, emotionList, utteranceList];
 let drag = null;
 let pressed = null;
 let wantedPick = null;
@@ -22,9 +24,7 @@ let asked = "";
 
 export async function begin() {
   new ResizeObserver(() => load(true)).observe(canvas);
-  phoneList.addEventListener("change", () => load(true));
-  kindList.addEventListener("change", () => load(true));
-  emotionList.addEventListener("change", () => load(true));
+  for (const element of lists) element.addEventListener("change", () => load(true));
   watch("selection choice", follow);
   watch("choices", redraw);
   watch("project", () => load(false));
@@ -48,7 +48,7 @@ export async function begin() {
 
 function begun({ model }) {
   const there = Boolean(model?.mapped.length);
-  for (const element of [phoneList, kindList, emotionList]) element.disabled = !there;
+  for (const element of lists) element.disabled = !there;
   note.textContent = there || !model ? "" : "This model has no nodes to look at.";
   phoneList.replaceChildren(...(model?.mapped ?? []).map((phone) => new Option(phone, phone)));
   emotionList.replaceChildren(new Option("all", ""), ...(model?.emotions ?? []).map((emotion) => new Option(emotion, emotion)));
@@ -65,7 +65,7 @@ function follow() {
 
 function load(again) {
   if (!store.model?.mapped.length || !phoneList.value || !canvas.clientWidth) return redraw();
-  const facts = { phone: phoneList.value, map: kindList.value, emotion: emotionList.value, size: [canvas.clientWidth, Math.max(canvas.clientHeight, 16)] };
+  const facts = { phone: phoneList.value, map: kindList.value, emotion: emotionList.value, utterance: utteranceList.value, size: [canvas.clientWidth, Math.max(canvas.clientHeight, 16)] };
   const now = JSON.stringify([facts, store.project.removed, store.project.drawn]);
   if (now === asked && !again) return mark();
   if (now !== asked) ask("map", facts).then(mark).catch((error) => say(error.message, true));
@@ -84,9 +84,18 @@ function heardMap(message) {
   message.lengths.reduce((sum, length) => (starts.push(sum), sum + length), 0);
   shown.map = { ...message, points: message.numbers, starts, place: new Map(message.nodes.map((node, k) => [node, k])) };
   shown.marks = null;
+  listUtterances(message.nodes);
   tools();
   redraw();
   found();
+}
+
+/** Those that the map's nodes come from; the one that is chosen stays. */
+function listUtterances(nodes) {
+  const chosen = utteranceList.value;
+  const names = [...new Set([...(chosen ? [chosen] : []), ...nodes.map((node) => node.slice(0, node.lastIndexOf(":")))])].sort();
+  utteranceList.replaceChildren(new Option("all", ""), ...names.map((name) => new Option(name === "+" ? "drawn" : name, name)));
+  utteranceList.value = chosen;
 }
 
 async function heardPicture(message) {

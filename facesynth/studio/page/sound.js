@@ -40,6 +40,7 @@ export async function load(address) {
   stop();
   loaded = address;
   rest = 0;
+  Object.assign(loop, { on: false, start: 0, end: 0 });
   context ??= new AudioContext();
   const answer = await fetch(address);
   if (!answer.ok) return say(await answer.text(), true);

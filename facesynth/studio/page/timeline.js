@@ -220,6 +220,8 @@ async function up() {
   nextTrial = null;
   if (done.last) await changeTake(done.last[0], done.last[1]);
   drag = null;
+  if (done.kind === "loop") setLoop(sound.loop.on);
+  if (done.kind === "scrub") chooseUnder();
   draw();
 }
 
@@ -234,6 +236,21 @@ function choosePhone(number) {
   changed("selection");
 }
 
+/** Choose the phone under the playhead, which stays where it is. */
+function chooseUnder() {
+  const take = currentTake();
+  const phone = indexAt(take.phones, sound.time());
+  if (phone === store.phone) return;
+  store.phone = phone;
+  store.region = indexAt(take.emotions, sound.time());
+  changed("selection");
+}
+
+function step(time) {
+  sound.seek(time);
+  chooseUnder();
+}
+
 function wheel(event) {
   event.preventDefault();
   if (event.ctrlKey || event.metaKey) zoom(Math.exp(event.deltaY * 0.002), at(event.offsetX));
@@ -244,20 +261,20 @@ function wheel(event) {
 function key(event) {
   const take = currentTake();
   if (!take || event.ctrlKey || event.metaKey) return;
-  const step = event.altKey ? (event.shiftKey ? 0.02 : 0.005) : 0;
+  const shift = event.altKey ? (event.shiftKey ? 0.02 : 0.005) : 0;
   const actions = {
-    ArrowLeft: () => (step ? nudge(-step) : choosePhone(store.phone - 1)),
-    ArrowRight: () => (step ? nudge(step) : choosePhone(store.phone + 1)),
+    ArrowLeft: () => (shift ? nudge(-shift) : choosePhone(store.phone - 1)),
+    ArrowRight: () => (shift ? nudge(shift) : choosePhone(store.phone + 1)),
     Enter: () => document.getElementById("phone-label")?.focus(),
     s: () => changeTake("split_phone", { phone: store.phone, at_s: sound.time(), label: take.phones[store.phone][0] }, "split"),
     j: () => changeTake("join_phones", { phone: store.phone }, "joined"),
-    Home: () => sound.seek(0),
-    End: () => sound.seek(duration()),
+    Home: () => step(0),
+    End: () => step(duration()),
     "+": () => zoom(0.6, sound.time()),
     "=": () => zoom(0.6, sound.time()),
     "-": () => zoom(1 / 0.6, sound.time()),
-    "[": () => sound.seek(sound.time() - 1 / (store.motion?.fps ?? 30)),
-    "]": () => sound.seek(sound.time() + 1 / (store.motion?.fps ?? 30)),
+    "[": () => step(sound.time() - 1 / (store.motion?.fps ?? 30)),
+    "]": () => step(sound.time() + 1 / (store.motion?.fps ?? 30)),
   };
   if (!actions[event.key]) return;
   event.preventDefault();
