@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from .errors import FacesynthError
 
 PCM, EXTENSIBLE = 1, 0xFFFE
+LONG = (b"RF64", b"BW64")
+"""First bytes of WAV files that may be longer than 4 GB; a part `ds64` of theirs states the size of the sound."""
+LONG_SIZE = 28
+"""Byte at which it does."""
 FIRST_CHUNK = 12
 """Byte at which the first part of the file begins."""
 
@@ -75,11 +79,18 @@ def find_samples(content: bytes | mmap.mmap) -> Samples | None:
         kind, size = struct.unpack_from("<4sI", content, at)
         start = at + 8
         if kind == b"data":
+            size = _long_size(content, size)
             after = start + size + size % 2
             whole = after >= len(content) or _are_chunks(content, after)
             return Samples(start, min(start + size, len(content)) if whole else len(content), size)
         at = start + size + size % 2
     return None
+
+
+def _long_size(content: bytes | mmap.mmap, size: int) -> int:
+    """Bytes of sound that a file states, where 32 bits may not hold them."""
+    in_ds64 = size == 0xFFFFFFFF and content[:4] in LONG and content[FIRST_CHUNK : FIRST_CHUNK + 4] == b"ds64"
+    return struct.unpack_from("<Q", content, LONG_SIZE)[0] if in_ds64 else size
 
 
 def _are_chunks(content: bytes | mmap.mmap, at: int) -> bool:

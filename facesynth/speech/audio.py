@@ -21,7 +21,7 @@ from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.long_arrays import Growing, all_finite, by_blocks, let_go, row_blocks
 from facesynth.inference.sound import KAISER_BETA, REACH, Resampler
-from facesynth.inference.wav import FIRST_CHUNK, find_samples
+from facesynth.inference.wav import FIRST_CHUNK, LONG, LONG_SIZE, find_samples
 from facesynth.packages import is_installed
 from facesynth.speech.containers import PRIMED, read_container, unstated_priming
 from facesynth.speech.one_channel import one_channel
@@ -43,6 +43,8 @@ LARGEST_KERNEL = 1 << 20
 BLOCK = 1 << 20
 """Samples read or resampled at once, about."""
 MPEG = frozenset({"MPEG", "MP3"})
+LAYERS = {"MPEG_LAYER_II": "mp2"}
+"""Codecs of that format which are not MP3."""
 """What libsndfile calls MP3."""
 MPEG_FRAME = 2048
 """Bytes that the first frame has at most, in which the priming is stated."""
@@ -199,11 +201,12 @@ def _read_plain(path: Path) -> Recorded | None:
             source, remarks = _mended(opened, stored)
             with soundfile.SoundFile(source) as file:
                 audio = one_channel(partial(_blocks, file))
-                rate, priming = int(file.samplerate), _priming(stored) if file.format in MPEG else 0
+                layer = LAYERS.get(file.subtype, "mp3")
+                rate, priming = int(file.samplerate), _priming(stored, layer) if file.format in MPEG else 0
     except (soundfile.LibsndfileError, RuntimeError):
         return None
     if priming:
-        remarks = (*remarks, *unstated_priming("mp3", priming, rate))
+        remarks = (*remarks, *unstated_priming(layer, priming, rate))
     return Recorded(audio[priming:], rate, remarks)
 
 
@@ -217,25 +220,30 @@ def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, .
     """The file, its header mended in memory where it is a WAV of which a recorder never wrote the size; and what was noticed."""
     head = stored.read(FIRST_CHUNK)
     stored.seek(0)
-    if head[:4] != b"RIFF" or head[8:] != b"WAVE":
+    if head[:4] not in (b"RIFF", *LONG) or head[8:] != b"WAVE":
         return stored, ()
     content = opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ))
     found = find_samples(content)
     if found is None or not found.remark:
         return stored, ()
-    if found.cut_off:
+    if found.cut_off and head[:4] not in LONG:
         return stored, (found.remark,)
     mended = bytearray(content)
-    struct.pack_into("<I", mended, found.start - 4, found.stop - found.start)
-    struct.pack_into("<I", mended, 4, len(mended) - 8)
+    if head[:4] in LONG:
+        mended[:4] = b"RF64"  # libsndfile knows it by this name
+        struct.pack_into("<Q", mended, LONG_SIZE, found.stop - found.start)
+        struct.pack_into("<I", mended, found.start - 4, 0xFFFFFFFF)
+    else:
+        struct.pack_into("<I", mended, found.start - 4, found.stop - found.start)
+        struct.pack_into("<I", mended, 4, len(mended) - 8)
     return BytesIO(mended), (found.remark,)
 
 
-def _priming(stored: BinaryIO) -> int:
-    """Samples that an encoder of MP3 put in front where the file does not say how many; libsndfile takes off what is stated."""
+def _priming(stored: BinaryIO, layer: str) -> int:
+    """Samples that an encoder of MP2 or MP3 put in front where the file does not say how many; libsndfile takes off stated ones."""
     stored.seek(0)
     head = stored.read(10)
     title = sum((byte & 127) << 7 * k for k, byte in enumerate(head[:5:-1])) + 10 if head[:3] == b"ID3" else 0
     stored.seek(title)
     first = stored.read(MPEG_FRAME)
-    return 0 if b"Xing" in first or b"Info" in first else PRIMED["mp3"]
+    return 0 if b"Xing" in first or b"Info" in first else PRIMED[layer]

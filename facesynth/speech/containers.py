@@ -38,10 +38,12 @@ LONGEST_SILENCE_S = 3600.0
 """Of all jumps together; what claims more has damaged time stamps."""
 LARGEST_OVERLAP_S = 1.0
 """Time stamps that go back further begin another recording."""
-PRIMED = {"aac": 1024, "mp3": 1105}
-"""Samples that any encoder of AAC puts in front at least, as the transform asks; those of LAME and its decoder for MP3."""
+PRIMED = {"aac": 1024, "mp3": 1105, "mp2": 481, "ac3": 256, "eac3": 256}
+"""Samples that any encoder puts in front at least, as the transform asks; those of LAME and its decoder for MP3."""
 LATEST = {"aac": 2112, "mp3": 1682}
 """Samples that some encoder puts in front."""
+BESIDE_PICTURES = frozenset({"aac", "mp3"})
+"""Codecs whose containers show by the pictures' time stamps whether they leave that in."""
 STATED = frozenset({"mov", "mp4", "m4a", "matroska", "webm", "ogg"})
 """Formats that say how much priming there is."""
 LONGEST_PRIMING_S = 0.1
@@ -89,10 +91,13 @@ class Beginning:
 
 def unstated_priming(codec: str, taken_off: int, rate: int) -> Iterator[str]:
     """What a person should know of a sound whose file does not say how much silence is in front of it."""
+    said = f"the file does not say how much silence its {codec.upper()} encoder put in front of the sound"
+    if codec not in LATEST:
+        yield f"{said}: {taken_off} samples were taken off, as such encoders need"
+        return
     late_ms = 1000 * (LATEST[codec] - taken_off) / rate
     done = f"{taken_off} samples were taken off, with some encoders it still" if taken_off else "with some it"
-    encoder = f"{codec.upper()} encoder"
-    yield f"the file does not say how much silence its {encoder} put in front of the sound: {done} comes {late_ms:.0f} ms late"
+    yield f"{said}: {done} comes {late_ms:.0f} ms late"
 
 
 def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
@@ -132,8 +137,9 @@ def beginning(path: Path) -> Beginning:
             raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
         codec = next((name for name in PRIMED if codec.startswith(name)), codec)
         states = bool(STATED & set(container.format.name.split(",")))
+        known = not states and (picture is None or codec in BESIDE_PICTURES)
         sound = _first_frame(container, [stream])
-        return Beginning(_time_s(sound) or 0.0, _time_s(picture), 0 if states else PRIMED.get(codec, 0), rate, codec)
+        return Beginning(_time_s(sound) or 0.0, _time_s(picture), PRIMED.get(codec, 0) if known else 0, rate, codec)
 
 
 def _first_frame(container: InputContainer, streams: Sequence[Any]) -> Any:

@@ -24,7 +24,18 @@ def test_priming_that_is_known_is_taken_off_without_a_word(tmp_path, suffix):
     assert read_sound(path).remarks == ()
 
 
-@pytest.mark.parametrize(("name", "codec"), [("a.aac", "aac"), ("a.ts", "aac"), ("b.ts", "libmp3lame"), ("a.mp3", "libmp3lame")])
+@pytest.mark.parametrize(
+    ("name", "codec"),
+    [
+        ("a.aac", "aac"),
+        ("a.ts", "aac"),
+        ("b.ts", "libmp3lame"),
+        ("a.mp3", "libmp3lame"),
+        ("a.mp2", "mp2"),
+        ("c.ts", "ac3"),
+        ("a.eac3", "eac3"),
+    ],
+)
 def test_streams_that_say_nothing_are_told(tmp_path, name, codec):
     path = write(tmp_path / name, codecs=("", codec), pictures=False)
     if name == "a.mp3":  # its first frame states the priming; players cut such files at will

@@ -52,6 +52,24 @@ def test_a_size_that_is_too_large_is_told(tmp_path, stated):
     assert f"the header states {stated} bytes of sound, 64000 are there" in sound.remarks[0]
 
 
+@pytest.mark.parametrize(("in_data", "in_ds64"), [(0xFFFFFFFF, 0), (0xFFFFFFFF, 4000), (0, 0), (1000, 0), (0xFFFFFFFF, 1 << 40)])
+@pytest.mark.parametrize("kind", [b"RF64", b"BW64"])
+def test_long_files_of_recorders_state_their_size_elsewhere(tmp_path, in_data, in_ds64, kind):
+    path = tmp_path / "a.wav"
+    soundfile.write(path, SOUND, RATE, format="RF64", subtype="PCM_16")
+    content = bytearray(path.read_bytes())
+    content[:4] = kind
+    path.write_bytes(content)
+    assert read_sound(path).remarks == ()
+    struct.pack_into("<QQQ", content, content.index(b"ds64") + 8, 0, in_ds64, 0)
+    struct.pack_into("<I", content, content.index(b"data") + 4, in_data)
+    path.write_bytes(content)
+    sound = read_sound(path)
+    np.testing.assert_allclose(sound.audio, SOUND, atol=1e-4)
+    stated = in_ds64 if in_data == 0xFFFFFFFF else in_data
+    assert f"the header states {stated} bytes of sound" in sound.remarks[0]
+
+
 def test_parts_after_the_sound_are_no_sound(tmp_path):
     path = tmp_path / "a.wav"
     soundfile.write(path, SOUND, RATE)
