@@ -142,11 +142,10 @@ class HeadStage:
         if self.request.mapping is None or not own_names or known:
             return motion
         from facesynth.face.rig.channel_map import ChannelMap
-        from facesynth.face.rig.mapping_file import read_mapping
-        from facesynth.face.rig.presets import is_preset, preset
+        from facesynth.face.rig.presets import asked_for
 
         names, asked = motion.layout.names, self.request.mapping
-        given = (preset(str(asked), names) if is_preset(asked) else read_mapping(asked)).channels
+        given = asked_for(asked, names).channels
         channel_map = ChannelMap.of(names, {name: channel for name, channel in given.items() if name in names})
         frames = channel_map.arkit(motion.frames).astype(np.float32)
         return replace(motion, frames=frames, layout=Layout("curves", ARKIT_NAMES))

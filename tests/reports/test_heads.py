@@ -196,6 +196,35 @@ def test_a_head_with_all_of_arkit_needs_no_preset():
     assert fitting(("one", "two", "three", "four")) == ("", {})
 
 
+FACESHIFT = """EyeBlink EyeSquint EyeDown EyeIn EyeOpen EyeOut EyeUp BrowsD BrowsU MouthFrown MouthSmile MouthDimple LipsStretch
+CheekSquint"""
+SINGLE = """BrowsU_C JawForward JawLeft JawOpen JawRight MouthLeft MouthRight LipsUpperUp LipsLowerDown LipsFunnel LipsPucker
+ChinLowerRaise ChinUpperRaise Sneer Puff"""
+
+
+def test_names_of_another_kind_beside_many_of_arkits_are_driven_too():
+    """Heads of FaceScape have 22 names of ARKit's, but no funnel and no pucker by them."""
+    names = [f"{name}_{side}" for name in FACESHIFT.split() for side in "LR"] + SINGLE.split()
+    assert len({arkit_name(name) for name in names} - {None}) > 15
+    chosen, ways = fitting(names)
+    assert chosen == "facs"
+    assert [name for name in names if not arkit_name(name) and name not in ways] == []
+    assert not [name for name in ways if arkit_name(name)], "none moves twice"
+    assert [dict(ways[name].shares) for name in ("LipsFunnel", "EyeUp_L")] == [{"mouthFunnel": 1.0}, {"eyeLookUpLeft": 1.0}]
+
+
+def test_a_preset_that_opens_the_mouth_goes_before_one_that_does_not(tmp_path, said):
+    names = ("viseme_PP", "viseme_aa", "viseme_O", "viseme_U", "mouthSmile")
+    channels, told = said(head(tmp_path / "head.glb", names=names))
+    assert any("follow the preset oculus" in line for line in told)
+    assert channels["viseme_aa"][OPENING].max() > 0.5
+
+
+def test_a_preset_that_there_is_not_is_told_with_those_there_are(tmp_path):
+    with pytest.raises(FacesynthError, match="unknown mapping 'cc5'; did you mean cc4"):
+        load_own_head(head(tmp_path / "head.glb"), "cc5")
+
+
 def test_every_preset_says_where_its_names_are_from():
     from importlib import resources
 

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf.scene import Part, Scene, read_scene
 from facesynth.face.rig.channel_map import ChannelMap
-from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
+from facesynth.face.rig.mapping_file import HeadMapping
 from facesynth.face.rig.obj import read_shapes
-from facesynth.face.rig.presets import fitting, is_preset, preset
+from facesynth.face.rig.presets import asked_for, fitting
 from facesynth.inference.errors import FacesynthError, unknown
 
 TEXELS = 5
@@ -132,7 +132,7 @@ def load_own_head(path: str | Path, mapping: str | Path | None = None, *, needs_
 def _mapping(found: Path | None, names: Sequence[str]) -> tuple[HeadMapping, tuple[str, ...]]:
     """What is said of channels of these names, and by whom, where nobody asked for that."""
     if found is not None:
-        return (preset(str(found), names) if is_preset(found) else read_mapping(found)), ()
+        return asked_for(found, names), ()
     name, channels = fitting(names)
     moved = sum(bool(channel.shares) for channel in channels.values())
     said = f"{moved} of its {len(names)} channels follow the preset {name}; --mapping takes another, or a file of your own"

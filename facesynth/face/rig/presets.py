@@ -7,11 +7,13 @@ from pathlib import Path
 
 from facesynth.face.rig.channel_map import Channel, arkit_name, folded_names
 from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
+from facesynth.inference.errors import unknown
 
 PRESETS = ("cc4", "facs", "metahuman", "vrm1", "vrm0", "readyplayerme", "oculus", "mmd")
 """Where two fit as well, the first is taken."""
 ENOUGH = 15
 """A head with so many of ARKit's names is driven by those; visemes that it has beside them would move the mouth twice."""
+JAW = "jawOpen"
 FEWEST = 3
 """Channels that a preset must drive, or half of them all, to be chosen by itself."""
 
@@ -26,16 +28,45 @@ def preset(name: str, channels: Sequence[str]) -> HeadMapping:
     return HeadMapping(_matched(name, channels))
 
 
+def asked_for(mapping: str | Path, channels: Sequence[str]) -> HeadMapping:
+    """What a preset or a mapping file says of a head with these channels; FacesynthError where it is neither."""
+    if is_preset(mapping):
+        return preset(str(mapping), channels)
+    if not Path(mapping).suffix and not Path(mapping).exists():
+        raise unknown("mapping", str(mapping), PRESETS)
+    return read_mapping(mapping)
+
+
 def fitting(channels: Sequence[str]) -> tuple[str, Mapping[str, Channel]]:
-    """The preset that drives most of these channels, and how; an empty name where ARKit's names do as well."""
-    by_name = {channel for channel in channels if arkit_name(channel)}
-    if len({arkit_name(channel) for channel in by_name}) >= ENOUGH:
-        return "", {}
-    moved = {name: by_name | {one for one, way in _matched(name, channels).items() if way.shares} for name in PRESETS}
-    best = max(PRESETS, key=lambda name: len(moved[name]))
-    added = len(moved[best] - by_name)
+    """The preset that drives most of these channels, and how; an empty name where ARKit's names do as well.
+
+    One that opens the mouth goes before one that does not. A head with `ENOUGH` of ARKit's names takes from it only channels
+    that follow weights which no name of ARKit's takes there, such as LipsFunnel beside jawOpen.
+    """
+    by_name = {channel: arkit for channel in channels if (arkit := arkit_name(channel))}
+    ways = {name: _matched(name, channels) for name in PRESETS}
+    if len(set(by_name.values())) >= ENOUGH:
+        ways = {name: _beside(taken, by_name) for name, taken in ways.items()}
+    best = max(PRESETS, key=lambda name: (_opens(ways[name], by_name), len(_moved(ways[name]) | set(by_name))))
+    added = len(_moved(ways[best]) - set(by_name))
     fits = added >= FEWEST or 2 * added >= len(channels) > 0
-    return (best, _matched(best, channels)) if fits else ("", {})
+    return (best, ways[best]) if fits else ("", {})
+
+
+def _moved(ways: Mapping[str, Channel]) -> set[str]:
+    return {channel for channel, way in ways.items() if way.shares}
+
+
+def _opens(ways: Mapping[str, Channel], by_name: Mapping[str, str]) -> bool:
+    """Whether a preset lowers the jaw of a head, or a name of ARKit's does, and the preset does more than that."""
+    lowers = JAW in by_name.values() or any(JAW in way.shares for way in ways.values())
+    return lowers and len(_moved(ways) - set(by_name)) >= FEWEST
+
+
+def _beside(ways: Mapping[str, Channel], by_name: Mapping[str, str]) -> dict[str, Channel]:
+    """Those channels that have no name of ARKit's and follow none of the weights that such names take."""
+    taken = set(by_name.values())
+    return {one: way for one, way in ways.items() if one not in by_name and way.shares and not taken & set(way.shares)}
 
 
 def _matched(name: str, channels: Sequence[str]) -> dict[str, Channel]:
