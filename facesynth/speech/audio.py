@@ -240,7 +240,7 @@ def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, .
 
 
 def _priming(stored: BinaryIO, layer: str) -> int:
-    """Samples that an encoder of MP2 or MP3 put in front where the file does not say how many; libsndfile takes off stated ones."""
+    """Samples that an encoder of MPEG put in front where the file does not say how many; libsndfile takes off the stated"""
     stored.seek(0)
     head = stored.read(10)
     title = sum((byte & 127) << 7 * k for k, byte in enumerate(head[:5:-1])) + 10 if head[:3] == b"ID3" else 0
