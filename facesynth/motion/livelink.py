@@ -8,7 +8,7 @@ semicolons. A row stands where its time code puts it: rows that were lost leave 
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,7 @@ def is_live_link(path: Path) -> bool:
     """Whether a table has the columns of a take, whatever their order, case and encoding."""
     try:
         with open(path, "rb") as file:
-            names = {name.lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:1])[0]}
+            names = {_spelled(name).lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:1])[0]}
     except (OSError, UnicodeDecodeError, csv.Error, IndexError):
         return False
     shapes = sum(name.lower() in names for name in WEIGHTS)
@@ -120,10 +120,13 @@ def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
         header, *rows = _cells(text.splitlines()) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
-    lower = [name.lower() for name in header]
+    lower = [_spelled(name).lower() for name in header]
     known = sum(name.lower() in lower for name in (*WEIGHTS, *ANGLES))
     if lower.count(TIMECODE.lower()) != 1 or "" in header or len(set(lower)) != len(lower) or not known:
-        odd = next((name for name in header if lower.count(name.lower()) > 1 or _spelled(name) == name.lower()), f"{header[:3]}")
+        odd = next(
+            (name for name in header if lower.count(_spelled(name).lower()) > 1 or _spelled(name) == name.lower()),
+            f"{header[:3]}",
+        )
         raise FacesynthError(
             f"{path} cannot be read as a Live Link Face CSV: its header has {odd[:60]!r}; wanted Timecode, BlendshapeCount,"
             " weights and angles"
@@ -144,7 +147,15 @@ def _cells(lines: Sequence[str]) -> list[list[str]]:
     return rows if sign == "," else [rows[0], *([cell.replace(",", ".") for cell in row] for row in rows[1:])] if rows else []
 
 
-_SPELLED = {name.lower(): name for name in (TIMECODE, COUNT, *WEIGHTS, *ANGLES)}
+def _variants(name: str) -> Iterator[str]:
+    """A name in small letters, and with a letter for its side."""
+    yield name
+    for side in ("left", "right"):
+        if name.endswith(side):
+            yield f"{name.removesuffix(side)}_{side[0]}"
+
+
+_SPELLED = {variant: name for name in (TIMECODE, COUNT, *WEIGHTS, *ANGLES) for variant in _variants(name.lower())}
 
 
 def _spelled(name: str) -> str:

@@ -1,5 +1,7 @@
 """Takes with columns of any order, case, number and encoding: one reader finds them by name."""
 
+import re
+
 import bringing
 import numpy as np
 import pytest
@@ -27,6 +29,7 @@ ODD = {
     "lower case": {"names": tuple(name.lower() for name in NAMES), "first": ("timecode", "blendshapecount")},
     "ARKit's case": {"names": tuple(name[0].lower() + name[1:] for name in NAMES), "first": ("Timecode", "BlendShapeCount")},
     "UTF-16 with semicolons": {"encoding": "utf-16", "sign": ";", "decimal": ","},
+    "a letter for the side": {"names": tuple(re.sub("(Left|Right)$", lambda side: f"_{side[0][0]}", name) for name in NAMES)},
     "another order": {"order": np.random.default_rng(1).permutation(63)},
 }
 
