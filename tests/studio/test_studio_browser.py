@@ -293,6 +293,7 @@ def test_nothing_serious_for_people_who_cannot_see_or_use_a_mouse(window):
     axe = axe_core()
     page = window(reduced_motion="reduce")
     page.load_a_line("s06_neutral_t1")
+    page.until("document.getElementById('map-nodes').children.length > 0")  # of silence, too, the list says what the map shows
     for tab in ("phone", "emotion", "table", "nodes", "options"):
         page.page.click(f"#show-{tab}")
         assert serious(page, axe) == []

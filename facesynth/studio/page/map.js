@@ -86,6 +86,7 @@ function heardMap(message) {
   shown.marks = null;
   listUtterances(message.nodes);
   tools();
+  list();
   redraw();
   found();
 }
@@ -113,6 +114,7 @@ function mark() {
   const [label, end] = take.phones[k] ?? [];
   if (label !== map.phone) {
     shown.marks = null;
+    list();
     return redraw();
   }
   const start = startOf(take, k);
