@@ -10,8 +10,8 @@ from facesynth.speech.phone_labels import QUIET
 from facesynth.speech.praat import Grid, Tier
 from facesynth.speech.segments import Segment
 
-_PHONES = re.compile(r"phone(?:me|mic|tic)?s?|(?<![a-z])phn?s?(?![a-z])|(?<![a-z])phonalign|^mau$")
-_WORDS = re.compile(r"words?|(?<![a-z])tokensalign|^ort(?:-mau)?$|(?<![a-z])orthograph(?:y|ic)")
+_PHONES = re.compile(r"phone(?:me|mic|tic)?s?|(?<![a-z])ph(?:n|on)?s?(?![a-z])|(?<![a-z])phonalign|^mau(?![a-z])")
+_WORDS = re.compile(r"words?|(?<![a-z])tokensalign|^ort(?:-mau)?(?![a-z])|(?<![a-z])orthograph(?:y|ic)")
 """As the Montreal aligner, ELAN, WebMAUS and SPPAS call them."""
 _CONFIDENCES = re.compile(r"confidences?")
 _BETWEEN = " -_@:./|#,;&"

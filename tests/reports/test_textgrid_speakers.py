@@ -15,6 +15,8 @@ NAMES = [
     ("words@Anna", "phones@Anna", "words@Bela", "phones@Bela"),
     ("Anna_Words", "Anna_Phones", "Bela_Words", "Bela_Phones"),
     ("words (Anna)", "phones (Anna)", "words (Bela)", "phones (Bela)"),
+    ("ORT-MAU_Anna", "MAU_Anna", "ORT-MAU_Bela", "MAU_Bela"),
+    ("word@Anna", "phon@Anna", "word@Bela", "phon@Bela"),
 ]
 
 
