@@ -180,7 +180,7 @@ def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArr
     weights, residual = solve_markers(MarkerBasis.fitted(rig, motion.layout, fit), motion.frames, motion.fps, known)
     lips = LipGap.of(rig)
     met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
-    return close_within_jaw(with_lips_apart(met, lips), lips), residual
+    return with_lips_apart(close_within_jaw(met, lips), lips), residual
 
 
 def _curves(motion: Motion) -> NDArray[np.float64]:
