@@ -11,7 +11,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -20,7 +20,7 @@ from unittest.mock import patch
 import numpy as np
 import torch
 
-from facesynth.corpus import Corpus, Utterance
+from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
 from facesynth.methods.learn import expectation, point_loss, windows
@@ -43,12 +43,9 @@ class Variant:
     """`room.NAME` of facesynth.methods.learn that are something else."""
     shape: Mapping[str, float] = field(default_factory=dict)
     """Of the network: width, dropout."""
-    unseen: float = 0.0
-    """Share of the pose to learn that is what networks say of it which learned from other clips."""
 
     def __or__(self, other: "Variant") -> "Variant":
-        both = {name: {**getattr(self, name), **getattr(other, name)} for name in ("settings", "constants", "shape")}
-        return Variant(**both, unseen=max(self.unseen, other.unseen))
+        return Variant(*({**getattr(self, name), **getattr(other, name)} for name in ("settings", "constants", "shape")))
 
 
 BOTH, PHONE_NET = Variant({"features": "both"}), Variant({"features": "phone_net"})
@@ -57,7 +54,6 @@ NOISY = Variant(constants={"windows.NOISE": 0.3, "windows.LOUDNESS": 0.3, "windo
 TEMPO = Variant(constants={"windows.TEMPO": 0.25})
 DROPPED = Variant({"steps": 1000}, shape={"dropout": 0.35})
 LONGER = Variant({"steps": 1400})
-UNSEEN = Variant(unseen=0.5)
 SETTLED = Variant(constants={"expectation.AVERAGED": 0.995})
 VARIANTS = {
     "base": Variant(),
@@ -69,13 +65,10 @@ VARIANTS = {
     "dropped": DROPPED,
     "longer": LONGER,
     "settled": SETTLED,
-    "unseen": UNSEEN,
     "both dropped": BOTH | DROPPED | SETTLED,
 }
 VARIANTS |= {"sound": Variant({"phones": False})}
 VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in (0, 40, 80, 160, 320)}
-PARTS = 4
-"""Of the clips, for networks that did not learn from some of them."""
 
 
 def main() -> None:
@@ -95,7 +88,7 @@ def main() -> None:
         path = options.output / f"{options.fold}_{name.replace(' ', '_')}_{options.seed}.safetensors"
         network = kept(path, learned, VARIANTS[name], options.seed, options.device)
         lips, energy = judged(network, held_out)
-        (path.with_suffix(".json")).write_text(json.dumps({"fold": options.fold, "variant": name, "lve": lips, "energy": energy}))
+        path.with_suffix(".json").write_text(json.dumps({"fold": options.fold, "variant": name, "lve": lips, "energy": energy}))
         print(f"| {options.fold} | {name} | {lips:.3f} | {energy:.2f} | {perf_counter() - began:.0f} s |", flush=True)
 
 
@@ -130,13 +123,7 @@ def kept(path: Path, corpus: Corpus, variant: Variant, seed: int, device: str) -
 def trained(corpus: Corpus, variant: Variant, seed: int, device: str) -> Network:
     """A network on the processor that learned on a device."""
     with changed(variant):
-        network = Network(**variant.settings).to(device)  # type: ignore[arg-type]
-        if variant.unseen:
-            recording, said = network.predictor.recording, said_unseen(corpus, variant, seed, device)
-            network.predictor.recording = lambda u, e: recording(mixed(u, said[u.id], variant.unseen), e)  # type: ignore
-        network.fit(corpus, seed=seed)
-        network.predictor.__dict__.pop("recording", None)
-        return network.to("cpu")
+        return Network(**variant.settings).to(device).fit(corpus, seed=seed).to("cpu")  # type: ignore[arg-type]
 
 
 OF_SOUND = Hearing.of_sound
@@ -163,25 +150,6 @@ def changed(variant: Variant) -> Iterator[None]:
     finally:
         for each in reversed(patches):
             each.stop()
-
-
-def said_unseen(corpus: Corpus, variant: Variant, seed: int, device: str) -> dict[str, np.ndarray]:
-    """Frames of each clip as a network says them that did not learn from it."""
-    order, said = np.random.default_rng(seed).permutation(len(corpus.ids)), {}
-    for part in range(PARTS):
-        left = [corpus.ids[i] for i in order[part::PARTS]]
-        network = Network(**variant.settings).to(device)  # type: ignore[arg-type]
-        network.fit(corpus.subset([i for i in corpus.ids if i not in set(left)]), seed=seed + part)
-        said |= {i: network.synthesize(corpus[i].speech).frames for i in left}
-    return said
-
-
-def mixed(utterance: Utterance, said: np.ndarray, share: float) -> Utterance:
-    """An utterance whose motion is partly that of frames [T', C]."""
-    frames = utterance.motion.frames.copy()
-    count = min(len(said), len(frames))
-    frames[:count] += share * (said[:count] - frames[:count])
-    return replace(utterance, motion=replace(utterance.motion, frames=frames))
 
 
 if __name__ == "__main__":

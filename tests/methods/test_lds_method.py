@@ -157,7 +157,7 @@ def test_a_saved_model_speaks_the_same(corpus, model, tmp_path):
     speech = corpus[corpus.ids[1]].speech
     back = load(tmp_path / "model.safetensors")
     assert isinstance(back, LDS)
-    np.testing.assert_allclose(back.synthesize(speech, seed=3).frames, model.synthesize(speech, seed=3).frames, atol=1e-4)
+    assert np.array_equal(back.synthesize(speech, seed=3).frames, model.synthesize(speech, seed=3).frames)
 
 
 def test_fits_repeat(corpus, model):

@@ -1,20 +1,17 @@
 """A head by constants: slow sway, and small nods where the voice is loud. Learned heads must be more like people than this."""
 
-from typing import Any, Self
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from torch import Tensor
 
-from facesynth.corpus import Corpus
 from facesynth.inference.arrays import Floats
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.methods.baselines.capabilities import HEAD_SWAY
-from facesynth.methods.learn.heads import mean_head, still_face, with_head
-from facesynth.methods.method import Method
+from facesynth.methods.baselines.heads import HeadRest
 from facesynth.methods.registry import register
 
 SWAY_DEGREES = (0.9, 1.4, 0.8)
@@ -28,34 +25,14 @@ LEVEL_S = 0.03
 
 
 @register(HEAD_SWAY)
-class HeadSway(Method):
+class HeadSway(HeadRest):
     """The mean of all recorded poses, swaying by constants."""
-
-    frame: Tensor
-    """[C] the face at rest."""
-    pose: Tensor
-    """[6] rotation vector (rad) and translation (mm)."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        for name in ("frame", "pose"):
-            self.register_buffer(name, torch.zeros(0))
-
-    def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
-        """Take the mean pose; FacesynthError for fewer than two recordings with a head."""
-        self.learned_from(corpus)
-        device, recordings = self.device, with_head(corpus)
-        arrays = (still_face(corpus), mean_head(recordings))
-        self.frame, self.pose = (torch.from_numpy(np.ascontiguousarray(a, np.float32)).to(device) for a in arrays)
-        return self.eval()
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """A head that sways about the mean pose, for as long as the phones last."""
-        self.refuse(options)
-        layout = self.fitted_layout
-        count = int(speech.phones.frame_bounds(self.fps)[-1])
-        head = self.pose.cpu().numpy() + quiet_head(count, self.fps, loudness(speech, count, self.fps), seed)
-        return Motion(np.tile(self.frame.cpu().numpy(), (count, 1)), self.fps, layout, head.astype(np.float32))
+        rest = super().synthesize(speech, seed=seed, **options)
+        sway = quiet_head(len(rest), self.fps, loudness(speech, len(rest), self.fps), seed)
+        return replace(rest, head=self.pose.cpu().numpy() + sway)
 
 
 def quiet_head(count: int, fps: float, loudness: Floats, seed: int) -> NDArray[np.float32]:
