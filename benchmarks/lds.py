@@ -37,7 +37,7 @@ def main() -> None:
         head = f"{len(corpus)} utterances, {number} of {options.folds} folds\n\n"
         write_text(options.output / "table.md", head + table(errors, corpus.layout.unit) + "\n")
     print(table(errors, corpus.layout.unit))
-    model = LDS(**configs["LDS"]).fit(corpus)
+    model = LDS.from_config(configs["LDS"]).fit(corpus)
     plot_orders(model, options.output / "orders.png")
     plot_innovations(model, options.output / "innovations.png")
 

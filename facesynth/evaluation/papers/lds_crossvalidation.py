@@ -72,7 +72,7 @@ def judge_fold(errors: Errors, configs: Mapping[str, Mapping[str, Any]], train: 
         errors.add("mean shape", _frames(mean.synthesize(utterance.speech)), _frames(utterance.motion))
         errors.add("ridge, log-mel", _frames(mel.synthesize(utterance.speech)), _frames(utterance.motion))
     for name, config in configs.items():
-        _judge(errors, name, LDS(**config).fit(train, seed=seed), train, test)
+        _judge(errors, name, LDS.from_config(config).fit(train, seed=seed), train, test)
 
 
 def table(errors: Errors, unit: str) -> str:
