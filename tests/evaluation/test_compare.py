@@ -216,7 +216,7 @@ def test_other_settings_under_the_same_label_are_made_anew(corpus, folds, tmp_pa
     assert evaluation.comparison.scores["some"]["energy_ratio"].mean > 0
 
 
-def test_other_people_s_predictions_are_judged_without_layout_or_folds(corpus, folder, tmp_path):
+def test_other_people_s_predictions_are_judged_without_layout_or_folds(result, corpus, folder, tmp_path):
     chosen = [i for i in corpus.ids if i.startswith(("s00", "s01"))]
     for utterance_id in chosen:
         _, motion = load_prediction(folder / "predictions" / "ridge" / f"{utterance_id}.npz")
