@@ -56,6 +56,13 @@ class Reach:
 
 WHOLE = Reach.seconds(10.0, 1.0, 1.0)
 """For sound that is there as a whole: windows of 12 s, which the network was made for."""
+STREAM_BLOCK_S, STREAM_PAST_S = 0.2, 4.0
+"""Of a stream: frames come out this often, and the network looks back this far, seconds."""
+
+
+def stream_reach(ahead_s: float) -> Reach:
+    """Of a stream whose windows reach so far beyond their block, seconds."""
+    return Reach.seconds(STREAM_BLOCK_S, STREAM_PAST_S, ahead_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +104,7 @@ class Ear:
         """Log-probabilities [t, V] of a whole sound [S], window by window: what was read need not be kept."""
         return (block.log_probabilities for block in self._of_whole(audio))
 
-    def _of_whole(self, audio: ArrayLike) -> "Iterator[_Block]":
+    def _of_whole(self, audio: ArrayLike) -> "Iterator[Block]":
         sound = checked_audio(audio)
         state = replace(self.start(), heard=_long_enough(sound), peak=loudest(sound))
         return self._blocks(state, ended=True)
@@ -106,8 +113,8 @@ class Ear:
         """Before the first sample."""
         return EarState(np.zeros(0, np.float32), 0, 0, 0.0)
 
-    def advance(self, state: EarState, audio: ArrayLike, *, ended: bool = False) -> tuple[list[Single], EarState]:
-        """More sound [S] at RATE: log-probabilities [t, V] of each block that became final, and the state after them.
+    def advance(self, state: EarState, audio: ArrayLike, *, ended: bool = False) -> "tuple[list[Block], EarState]":
+        """More sound [S] at RATE: each block that became final, and the state after them.
 
         `ended`: nothing comes after this sound.
         """
@@ -115,9 +122,9 @@ class Ear:
         if ended and not state.first:
             state = replace(state, heard=_long_enough(state.heard))
         found = list(self._blocks(state, ended))
-        return [block.log_probabilities for block in found], found[-1].after if found else state
+        return found, found[-1].after if found else state
 
-    def _blocks(self, state: EarState, ended: bool) -> "Iterator[_Block]":
+    def _blocks(self, state: EarState, ended: bool) -> "Iterator[Block]":
         """All blocks whose windows lie within the sound that is known; at its end the last windows are shorter."""
         reach, total = self.reach, state.samples
         count = total // STEP + 1
@@ -129,7 +136,7 @@ class Ear:
             yield block
             state = block.after
 
-    def _block(self, state: EarState, end: int, stop: int) -> "_Block":
+    def _block(self, state: EarState, end: int, stop: int) -> "Block":
         """Frames up to `stop` from the sound up to sample `end`."""
         begin = max(0, state.frames - self.reach.before)
         window = state.heard[(begin - state.first) * STEP : end - state.first * STEP]
@@ -139,13 +146,18 @@ class Ear:
         let_go(state.heard)
         kept = max(state.first, stop - self.reach.before)
         after = EarState(state.heard[(kept - state.first) * STEP :], kept, stop, peak)
-        return _Block(log_probabilities[0, rows], hidden[0, rows], after)
+        return Block(log_probabilities[0, rows], hidden[0, rows], after)
 
 
-class _Block(NamedTuple):
+class Block(NamedTuple):
+    """Frames that came out of one window."""
+
     log_probabilities: Single
+    """[t, V]"""
     hidden: Single
+    """[t, L, W]"""
     after: EarState
+    """The state after them."""
 
 
 def _long_enough(sound: Single) -> Single:

@@ -16,7 +16,7 @@ from .errors import unknown
 from .filters import cubic_at
 from .folder import Folder
 from .graphs import Graph
-from .heard import exported_hear
+from .heard import exported_listening
 from .long_arrays import BLOCK_ROWS, joined
 from .phones import PHONES
 from .sound import resample
@@ -75,7 +75,7 @@ class Said:
     """What is said, as the network is told it."""
 
     phones: Sequence[int]
-    """[P] numbers in PHONES."""
+    """[P] numbers in PHONES; none where nobody knows what is said."""
     ends_s: Floats
     """[P]"""
     emotions: Single
@@ -92,6 +92,11 @@ class Said:
             calm = np.eye(len(emotions), dtype=np.float32)[emotions.index(NEUTRAL)]
             shares = calm + intensity[:, None].astype(np.float32) * (shares - calm)
         return cls([PHONES.index(label) for label in speech.phones.labels], speech.phones.ends_s, shares)
+
+    @classmethod
+    def unknown(cls, emotion: int, count: int) -> Self:
+        """Of speech whose phones nobody knows, in one emotion of `count`."""
+        return cls((), np.array([np.inf]), np.eye(count, dtype=np.float32)[[emotion]])
 
     @classmethod
     def numbered(cls, phones: Sequence[int], ends_s: Floats, emotions: Sequence[int], count: int) -> Self:
@@ -128,7 +133,9 @@ class Reading:
         heard = self.standard.at(bands, times_s[:, None] + around).reshape(len(times_s), -1)
         number = np.minimum(np.searchsorted(said.ends_s, times_s, side="right"), len(said.ends_s) - 1)
         columns = [heard]
-        if self.phones:
+        if self.phones and not len(said.phones):
+            columns.append(np.zeros((len(times_s), self.said_width), np.float32))
+        elif self.phones:
             each = PHONE_SIZE * np.eye(len(PHONES), dtype=np.float32)[np.asarray(said.phones)]
             columns += [each[number], _place(said.ends_s, number, times_s)]
         if self.emotion_count > 1:
@@ -182,7 +189,7 @@ class Expectation:
 
 def exported_bands(folder: Folder, threads: int) -> Bands:
     """What the graphs of a folder hear in a speech."""
-    hear = exported_hear(folder, threads)
+    hear = exported_listening(folder, threads)
     return lambda speech: hear(resample(speech.audio, speech.sample_rate, RATE))
 
 

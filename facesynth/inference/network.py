@@ -1,6 +1,6 @@
 """The network of poses: speech in, frames out, at once or as the sound comes in."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,24 +13,17 @@ from .errors import FacesynthError, reject_options, unknown
 from .expectation import BANDS_FPS, BEYOND, EACH, RATE, Expectation, Said, Single, exported_expectation
 from .filters import cubic_at, sharpen
 from .folder import Folder
-from .heard import exported_hear
+from .heard import HOP, Listening, exported_listening
 from .layout import Layout
 from .lips import bilabial_spans
-from .long_arrays import Growing, by_blocks, let_go
+from .long_arrays import by_blocks
 from .motion import Motion
-from .phones import PHONE_INDEX, SILENCE
 from .residual import ResidualMotion, exported_residual, main_emotion
 from .sound import resample
 from .speech import NEUTRAL, Speech
 
-HOP = round(RATE / BANDS_FPS)
-"""Samples from one frame of bands to the next."""
-HALF_WINDOW = 256
-"""Samples on either side of its centre that a frame of bands depends on."""
-PIECE = 3000
-"""Frames of bands that are heard at once."""
-AROUND = 3
-"""Frames of bands that are heard once more beside new ones: the first of a piece lack what came before it."""
+AHEAD_S = 0.4
+"""How far the windows in which a stream hears with the phone network reach ahead, unless told otherwise, seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +33,8 @@ class Network:
     layout: Layout
     fps: float
     emotions: tuple[str, ...]
-    hear: Callable[[Single], Single]
-    """Sound [S] at RATE to bands [F, B]."""
+    hear: Listening
+    """Sound [S] at RATE to features [F, B]."""
     expectation: Expectation
     """Of frames [C]."""
     sharpening: float = 0.0
@@ -49,64 +42,64 @@ class Network:
     """How near the lips come at a p, b or m; infinite where they are left as they are."""
     residual: ResidualMotion | None = None
     """What moves beside the lips, whatever is said."""
-    streams: bool = True
-    """Whether what it hears of a piece of sound is the same in a stream: true of log-mel bands alone."""
+    unsaid: bool = False
+    """Whether it learned to do without being told what is said."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that it comes from."""
 
     @property
     def look_ahead_s(self) -> float:
-        """In a stream frame t waits for the sound up to about t / fps + this, seconds."""
-        return self.expectation.look_ahead_s + BEYOND / self.expectation.reading.rate + HALF_WINDOW / RATE
+        """In a stream frame t waits for the sound up to t / fps + this, seconds, or less."""
+        return self.late_s(AHEAD_S)
+
+    def late_s(self, ahead_s: float) -> float:
+        """The same of a stream whose windows reach so far ahead, seconds."""
+        later_s = self.expectation.look_ahead_s + BEYOND / self.expectation.reading.rate
+        return later_s + self.hear.look_ahead_s(ahead_s) + HOP / RATE
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """What is expected, sharpened, lips closed at p, b and m, and what moves beside the lips. Nothing is random."""
         reject_options("network", options, ("seed",))
         sound = resample(speech.audio, speech.sample_rate, RATE)
-        bands = bands_of(self.hear, sound) if self.streams else self.hear(sound)
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
-        frames = self.expectation.poses(bands, Said.of(speech, self.emotions), self.fps, count)
+        frames = self.expectation.poses(self.hear(sound), Said.of(speech, self.emotions), self.fps, count)
         frames = sharpen(frames, self.sharpening, self.fps)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         if self.residual is not None:
             frames = self.residual.added(frames, speech, main_emotion(speech, self.emotions), self.fps)
         return Motion(by_blocks(np.asarray, frames), self.fps, self.layout)
 
-    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> "SoundStream":
+    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None, ahead_s: float = AHEAD_S) -> "SoundStream":
         """Sound in pieces of any size at RATE, one emotion throughout (neutral, or the first that the model knows).
 
-        FacesynthError for a model that is told phones, which a stream does not know, or hears more than log-mel bands. A
-        stream is not sharpened, closes no lips, and adds no residual motion.
+        `ahead_s` is how far the windows of the phone network reach ahead, for a model that hears with it: what comes out
+        depends on it a little, as it does on how loud the sound was so far. FacesynthError for a model that cannot do without
+        being told phones, which a stream does not know. A stream is not sharpened, closes no lips, and adds no residual motion.
         """
-        if not self.streams:
-            raise FacesynthError("this network hears whole utterances; for a stream train with features=log_mel, phones=false")
-        if self.expectation.reading.phones:
-            raise FacesynthError("this network is told what is said and wants whole utterances; train one with phones=false")
+        if self.expectation.reading.phones and not self.unsaid:
+            raise FacesynthError(
+                "this network is told what is said and wants whole utterances; train one with phones=false, or with unsaid=0.3"
+            )
         felt = (NEUTRAL if NEUTRAL in self.emotions else self.emotions[0]) if emotion is None else emotion
         if felt not in self.emotions:
             raise unknown("emotion", felt, self.emotions)
         checked_rate(RATE if sample_rate is None else sample_rate, RATE)
-        return SoundStream(self, self.emotions.index(felt))
-
-
-def bands_of(hear: Callable[[Single], Single], sound: Single) -> Single:
-    """[F, B] what is heard in a sound [S] at RATE, heard piece by piece: the bands of a frame depend on little around it."""
-    count, parts = 1 + len(sound) // HOP, Growing()
-    for first in range(0, count, PIECE):
-        begin, stop = max(0, first - AROUND), min(first + PIECE, count)
-        end = len(sound) if stop == count else (stop + AROUND) * HOP
-        parts.add(hear(sound[begin * HOP : end])[first - begin : stop - begin])
-        let_go(sound)
-    return parts.whole()
+        return SoundStream(self, self.emotions.index(felt), ahead_s)
 
 
 class SoundStream:
-    """`push` sound, get the frames that became final: those of `synthesize` without sharpening, closing of lips and residual."""
+    """`push` sound, get the frames that became final: those of `synthesize` without sharpening, closing of lips and residual.
 
-    def __init__(self, model: Network, emotion: int) -> None:
+    A network that hears with the phone network hears through the windows of the stream, not of the whole. How the sound is cut
+    changes nothing.
+    """
+
+    def __init__(self, model: Network, emotion: int, ahead_s: float) -> None:
         self.model, reading = model, model.expectation.reading
-        self._said = Said.numbered([PHONE_INDEX[SILENCE]], np.array([np.inf]), [emotion], len(model.emotions))
-        self._sound, self._first_sample = np.zeros(0, np.float32), 0
+        self.look_ahead_s = model.late_s(ahead_s)
+        """Frame t is final when the sound up to t / fps + this is known, or earlier, seconds."""
+        self._said = Said.unknown(emotion, len(model.emotions))
+        self._pieces, self._samples = model.hear.pieces(ahead_s), 0
         self._bands, self._first_band = np.zeros((0, len(reading.standard.mean)), np.float32), 0
         self._poses, self._first_pose = np.zeros((0, model.layout.channels)), 0
         self._given = 0
@@ -115,8 +108,9 @@ class SoundStream:
     def push(self, audio: ArrayLike) -> NDArray[np.float32]:
         """More sound [S] at RATE; the frames [t, C] that became final."""
         require_open(self._ended)
-        self._sound = np.concatenate([self._sound, checked_piece(audio)])
-        self._hear((self._samples - HALF_WINDOW) // HOP + 1)
+        sound = checked_piece(audio)
+        self._hear(sound)
+        self._samples += len(sound)
         expectation, ratio = self.model.expectation, self._ratio
         last_s = (self._first_band + len(self._bands) - 1) / BANDS_FPS
         known = int(np.floor(last_s * expectation.reading.rate - (EACH - 1) / (2 * EACH))) - expectation.ahead + 1
@@ -129,31 +123,20 @@ class SoundStream:
         self._ended = True
         if not self._samples:
             return np.zeros((0, self.model.layout.channels), np.float32)
-        self._hear(1 + self._samples // HOP)
+        self._hear(np.zeros(0, np.float32), ended=True)
         count = max(1, round(self._samples / RATE * self.model.fps))
         self._expect(int(np.floor((count - 1) * self._ratio + 1e-9)) + 1 + BEYOND)
         return self._give(count)
-
-    @property
-    def _samples(self) -> int:
-        """How many came in."""
-        return self._first_sample + len(self._sound)
 
     @property
     def _ratio(self) -> float:
         """Frames of the network for one frame of the motion."""
         return self.model.expectation.reading.rate / self.model.fps
 
-    def _hear(self, stop: int) -> None:
-        """Bands up to frame `stop`; sound that no later one needs is forgotten."""
-        have = self._first_band + len(self._bands)
-        if stop <= have:
-            return
-        begin = max(0, have - AROUND)
-        bands = self.model.hear(self._sound[begin * HOP - self._first_sample :])[have - begin : stop - begin]
-        self._bands = np.concatenate([self._bands, bands])
-        kept = max(0, stop - AROUND) * HOP
-        self._sound, self._first_sample = self._sound[kept - self._first_sample :], kept
+    def _hear(self, sound: Single, *, ended: bool = False) -> None:
+        heard = self._pieces.push(sound, ended=ended)
+        if len(heard):
+            self._bands = np.concatenate([self._bands, heard])
 
     def _expect(self, stop: int) -> None:
         """Poses up to frame `stop` of the network; bands that no later one needs are forgotten."""
@@ -183,11 +166,11 @@ def load_network(folder: Folder, threads: int) -> Network:
         folder.layout,
         float(manifest["fps"]),
         tuple(manifest["emotions"]),
-        exported_hear(folder, threads),
+        exported_listening(folder, threads),
         exported_expectation(folder, arrays, threads),
         sharpening=float(settings["sharpening"]),
         closed_gap=np.inf if gap is None else float(gap),
         residual=exported_residual(folder, arrays),
-        streams=set(folder.manifest["graphs"]) == {"expectation", "log_mel"},
+        unsaid=bool(settings.get("unsaid")),
         manifest=manifest,
     )

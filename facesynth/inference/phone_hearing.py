@@ -8,15 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import checked_rate, require_open
-from .ear import RATE, WHOLE, Ear, EarState, Reach
+from .ear import RATE, WHOLE, Ear, EarState, Reach, stream_reach
 from .folder import Folder
 from .graphs import Graph, Part
 from .sound import resample
 from .speech import PhoneTrack
 from .spikes import Alphabet, Placed, Placer, Spike, SpikeReader, placed_around
-
-STREAM_BLOCK_S, STREAM_PAST_S = 0.2, 4.0
-"""Of a stream: phones come out this often, and the network looks back this far, seconds."""
 
 
 class PhoneHearing:
@@ -49,7 +46,7 @@ class PhoneHearing:
     def stream(self, *, look_ahead_s: float = 0.4, sample_rate: int | None = None) -> "PhoneStream":
         """Sound in pieces of any size; `sample_rate` must be RATE, and the look-ahead is that of the network's windows."""
         checked_rate(RATE if sample_rate is None else sample_rate, RATE)
-        return PhoneStream(self, Reach.seconds(STREAM_BLOCK_S, STREAM_PAST_S, look_ahead_s))
+        return PhoneStream(self, stream_reach(look_ahead_s))
 
 
 class PhoneStream:
@@ -68,7 +65,7 @@ class PhoneStream:
         blocks, self._state = self._ear.advance(self._state, audio)
         placed: list[Placed] = []
         for block in blocks:
-            found = self._reader.read(block)
+            found = self._reader.read(block.log_probabilities)
             placed += self._placer.place(found, self._reader.read_s)
         return placed
 
@@ -78,7 +75,7 @@ class PhoneStream:
         self._ended = True
         duration_s = self._state.samples / RATE
         blocks, self._state = self._ear.advance(self._state, np.zeros(0, np.float32), ended=True)
-        found = [spike for block in blocks for spike in self._reader.read(block)]
+        found = [spike for block in blocks for spike in self._reader.read(block.log_probabilities)]
         return self._placer.end([*found, *self._reader.end()], duration_s)
 
 

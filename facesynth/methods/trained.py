@@ -73,6 +73,12 @@ class ExportedModel:
         motion: Motion = self.model.synthesize(speech, seed=seed, **options)
         return motion
 
+    def stream(self, **options: Any) -> Any:
+        """A stream (docs/runtime.md says of what, by method); FacesynthError where the model must have the whole."""
+        if not hasattr(self.model, "stream"):
+            raise FacesynthError(f"{self.name} has no stream; give it whole utterances: model.synthesize(speech)")
+        return self.model.stream(**options)
+
 
 def on_device(trained: Any, device: str) -> TrainedModel:
     """A model where a person wants it: auto, cpu, cuda or mps; FacesynthError where that is not there."""

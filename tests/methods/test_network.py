@@ -19,8 +19,10 @@ from facesynth.methods.learn.pose_network import REACH, SYMMETRIC, PoseNetwork
 from facesynth.methods.learn.windows import Batch
 from facesynth.methods.network.method import Network
 from facesynth.methods.registry import create, load
+from facesynth.speech.phone_archive import is_installed
 
 RNG = np.random.default_rng(3)
+needs_weights = pytest.mark.skipif(not is_installed(), reason="the weights that phones are heard with are not installed")
 
 
 @pytest.fixture(scope="module")
@@ -108,8 +110,43 @@ def test_a_stream_is_as_late_as_it_says_and_remembers_no_more_than_it_needs(by_s
     for second in range(1, 21):
         stream.push(0.1 * RNG.standard_normal(16000).astype(np.float32))
         assert stream._given >= (second - late_s) * 50 - 1
-    kept = len(stream._sound), len(stream._bands), len(stream._poses)
+    kept = len(stream._pieces._sound), len(stream._bands), len(stream._poses)
     assert np.all(np.array(kept) < (2000, 400, 60))
+
+
+@needs_weights
+@pytest.mark.parametrize("features", ["phone_net", "both"])
+def test_what_hears_with_the_phone_network_streams_too_exported_as_well(halves, tmp_path, features):
+    few = halves[0].subset(halves[0].ids[:4])
+    model = Network(steps=2, features=features, unsaid=0.3, look_ahead_s=0.08).fit(few)
+    sound = 0.1 * RNG.standard_normal(40000).astype(np.float32)
+
+    def streamed(speaker, sizes, **options):
+        stream = speaker.stream(emotion="happy", **options)
+        given = [stream.push(piece) for piece in np.split(sound, np.cumsum(sizes))]
+        return np.concatenate([*given, stream.finish()])
+
+    wanted = streamed(model, [])
+    assert len(wanted) == round(len(sound) / 16000 * 50)
+    for sizes in ([1, 7, 160, 4000, 2, 9000], list(RNG.integers(1, 3000, 12))):
+        np.testing.assert_allclose(streamed(model, sizes), wanted, atol=1e-3)
+    assert not np.allclose(streamed(model, [], ahead_s=0.1), wanted, atol=1e-3)
+    model.save(tmp_path / "m.safetensors")
+    export_model(tmp_path / "m.safetensors", tmp_path / "folder")
+    exported = load_folder(tmp_path / "folder")
+    np.testing.assert_allclose(streamed(exported, [800] * 20), wanted, atol=2e-3 * np.abs(wanted).max())
+    stream = exported.stream()
+    assert stream.look_ahead_s == pytest.approx(model.speaker().late_s(0.4)) == exported.look_ahead_s
+    for second in range(1, 8):
+        stream.push(0.1 * RNG.standard_normal(16000).astype(np.float32))
+        assert stream._given >= (second - stream.look_ahead_s) * 50 - 1
+
+
+@needs_weights
+def test_who_was_never_left_untold_cannot_do_without_phones(halves):
+    few = halves[0].subset(halves[0].ids[:3])
+    with pytest.raises(FacesynthError, match="unsaid"):
+        Network(steps=1, features="phone_net").fit(few).stream()
 
 
 def test_what_a_stream_cannot_know_is_refused(by_sound, halves):

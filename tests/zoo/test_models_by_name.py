@@ -57,6 +57,17 @@ def test_a_model_of_the_package_has_a_card_that_says_what_it_may_be_used_for(nam
         assert figure.command.split()[0] in ("facesynth", "python")
 
 
+def test_the_default_model_streams_by_its_name_and_one_that_cannot_says_so():
+    sound = 0.1 * np.random.default_rng(0).standard_normal(32000).astype(np.float32)
+    stream = facesynth.load(DEFAULT).stream()
+    frames = np.concatenate([*(stream.push(piece) for piece in np.split(sound, [5000, 5001, 20000])), stream.finish()])
+    assert len(frames) == 2 * facesynth.load(DEFAULT).fps
+    assert np.isfinite(frames).all()
+    assert np.ptp(frames, axis=0).max() > 0.1
+    with pytest.raises(FacesynthError, match="coarticulation has no stream; give it whole utterances"):
+        facesynth.load("grid-s1").stream()
+
+
 def test_all_models_of_the_package_are_small_enough_to_come_with_it():
     assert sum(entry(path.name).size_bytes for path in PACKAGED.iterdir()) < 15e6
 

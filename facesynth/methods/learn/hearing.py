@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import unknown
 from facesynth.inference.expectation import Standard
-from facesynth.inference.heard import hidden_layer
+from facesynth.inference.heard import Listening, hidden_layer
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.speech.mel import LogMel
@@ -87,13 +87,23 @@ class Hearing(nn.Module):
         """[F, W] of a speech, not standardised, a frame every 10 ms."""
         return self.of_sound(np.ascontiguousarray(resample(speech.audio, speech.sample_rate, self.mel.sample_rate)))
 
-    @torch.no_grad()
     def of_sound(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same of sound [S] at 16 kHz."""
         if self.features == "phone_net":
             return self._hidden(audio)
-        heard: NDArray[Any] = self.mel(torch.from_numpy(audio).to(self.mel.window.device)).cpu().numpy()
+        heard = self._bands(audio)
         return heard if self.features == "log_mel" else np.hstack([heard, self._hidden(audio)])
+
+    def listening(self) -> Listening:
+        """What a model speaks by: the same of whole sounds, and of sound in pieces."""
+        bands = None if self.features == "phone_net" else self._bands
+        network = None if self.features == "log_mel" else phone_network().part
+        return Listening(bands, network, int(self.layer) if network else 0)
+
+    @torch.no_grad()
+    def _bands(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
+        found: NDArray[np.float32] = self.mel(torch.from_numpy(audio).to(self.mel.window.device)).cpu().numpy()
+        return found
 
     def _hidden(self, audio: NDArray[np.float32]) -> NDArray[np.float32]:
         return hidden_layer(phone_network().part, audio, int(self.layer))

@@ -3,15 +3,14 @@
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import nn
 
 from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion
+from facesynth.inference.network import AHEAD_S, SoundStream
 from facesynth.inference.network import Network as Speaker
-from facesynth.inference.network import SoundStream
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.expectation import STEPS, PosePredictor
 from facesynth.methods.learn.hearing import Features
@@ -97,12 +96,12 @@ class Network(Method):
             self.fitted_layout,
             self.fps,
             self.emotions,
-            self._hear,
+            self.predictor.hearing.listening(),
             self.predictor.expectation(),
             sharpening=self.config["sharpening"],
             closed_gap=np.inf if gap is None else gap,
             residual=self.residual.motion(self.fps, self.config["residual"]) if self.residual else None,
-            streams=self.config["features"] == "log_mel",
+            unsaid=self.config["unsaid"] > 0,
         )
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
@@ -110,9 +109,6 @@ class Network(Method):
         self.refuse(options)
         return self.speaker().synthesize(speech)
 
-    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None) -> SoundStream:
+    def stream(self, *, emotion: str | None = None, sample_rate: int | None = None, ahead_s: float = AHEAD_S) -> SoundStream:
         """Sound in pieces, frames as soon as they are final; see `inference.network`."""
-        return self.speaker().stream(emotion=emotion, sample_rate=sample_rate)
-
-    def _hear(self, sound: NDArray[np.float32]) -> NDArray[np.float32]:
-        return self.predictor.hearing.of_sound(sound)
+        return self.speaker().stream(emotion=emotion, sample_rate=sample_rate, ahead_s=ahead_s)
