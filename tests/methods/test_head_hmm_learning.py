@@ -32,6 +32,10 @@ def test_a_codebook_finds_heaps_and_stops_where_all_points_are_alike():
     assert len(codebook(np.ones((20, 2)), 8).means) == 1
 
 
+def test_a_codebook_ends_where_a_cell_has_nobody_on_the_side_to_which_it_is_split():
+    assert len(codebook(np.array([[1.0, -1.0], [-1.0, 1.0]]), 2).means) == 1
+
+
 def sequences(count=12, dimensions=2):
     """Of three states one after the other."""
     return [

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from facesynth.inference.arrays import Floats, Ints
 
@@ -36,27 +37,24 @@ def codebook(points: Floats, size: int) -> Codebook:
         halved = halved[sizes[halved] > 0]
         if not len(halved):
             break
+        before = means
         # The mean of a cell stays, and the other half begins beside it: a split cannot raise the distortion.
         means, labels = _settled(points, np.concatenate([means, means[halved] + SPLIT * spread[halved]]), distortions)
+        if np.array_equal(means, before):  # a half beside which no point lies, as between (1, -1) and (-1, 1), comes again
+            break
     return Codebook(means, labels, tuple(distortions))
 
 
 def _settled(points: Floats, means: Floats, distortions: list[float]) -> tuple[Floats, Ints]:
     """Lloyd's rounds; cells that nobody is in are left out."""
     for _ in range(MOST_ROUNDS):
-        labels, _squares = _nearest(points, means)
-        used = np.unique(labels)
-        labels = np.searchsorted(used, labels)
-        means = np.stack([points[labels == k].mean(axis=0) for k in range(len(used))])
+        labels = cdist(points, means, "sqeuclidean").argmin(axis=1)
+        _used, labels, counts = np.unique(labels, return_inverse=True, return_counts=True)
+        sums = np.stack([np.bincount(labels, weights=column) for column in points.T], axis=1)
+        means = sums / counts[:, None]
         distortion = float(np.square(points - means[labels]).sum(axis=1).mean())
         settled = len(distortions) > 0 and distortion > (1 - SETTLED) * distortions[-1]
         distortions.append(distortion)
         if settled:
             break
     return means, labels
-
-
-def _nearest(points: Floats, means: Floats) -> tuple[Ints, Floats]:
-    squares = np.square(points[:, None] - means).sum(axis=2)
-    labels = squares.argmin(axis=1)
-    return labels, squares[np.arange(len(points)), labels]
