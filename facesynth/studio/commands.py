@@ -7,9 +7,10 @@ from typing import Any, get_origin
 
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.studio import emotion_commands, line_commands, phone_commands
-from facesynth.studio.document import Document
+from facesynth.studio.document import Document, Take
 
-Change = Callable[..., Document]
+Change = Callable[..., Any]
+"""Of a document, or of a take: the same afterwards."""
 
 CHANGES: Mapping[str, Change] = {
     change.__name__: change
@@ -46,16 +47,23 @@ _KINDS: Mapping[Any, tuple[tuple[type, ...], str]] = {
 
 
 def changed(document: Document, name: str, arguments: Mapping[str, Any]) -> Document:
-    """The document after a change; FacesynthError, and nothing changed, for what cannot be done."""
+    """The document after a change; FacesynthError, and nothing changed, for what cannot be done.
+
+    A change of one take gets that take, and says in its arguments which take of which line it is.
+    """
     if name not in CHANGES:
         raise unknown("change", name, CHANGES)
     change = CHANGES[name]
-    wanted = {key: get_origin(p.annotation) or p.annotation for key, p in list(inspect.signature(change).parameters.items())[1:]}
+    (_, of), *rest = ((key, get_origin(p.annotation) or p.annotation) for key, p in inspect.signature(change).parameters.items())
+    wanted = {**({"line": str, "take": str} if of is Take else {}), **dict(rest)}
     if set(arguments) != set(wanted):
         raise FacesynthError(f"{name} wants {', '.join(wanted)}; got {', '.join(arguments) or 'nothing'}")
     for key, value in arguments.items():
         _check(name, key, wanted[key], value)
-    return change(document, **arguments)
+    if of is Document:
+        return change(document, **arguments)
+    own = {key: value for key, value in arguments.items() if key not in ("line", "take")}
+    return document.changing(arguments["line"], arguments["take"], lambda take: change(take, **own))
 
 
 def _check(name: str, key: str, kind: Any, value: Any) -> None:

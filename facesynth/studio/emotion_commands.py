@@ -8,88 +8,66 @@ import numpy as np
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.intensity import IntensityCurve
-from facesynth.studio.document import CurvePoint, Document, Region, Take, in_file
+from facesynth.studio.document import CurvePoint, Region, Take, in_file
 
 SHORTEST_REGION_S = 0.02
 
 
-def paint_emotion(
-    document: Document, line: str, take: str, start_s: float, end_s: float, emotion: str, intensity: float
-) -> Document:
+def paint_emotion(old: Take, start_s: float, end_s: float, emotion: str, intensity: float) -> Take:
     """Let an emotion be felt from one moment to another, whatever was felt there before."""
-
-    def change(old: Take) -> Take:
-        low, high = in_file(max(0.0, start_s)), min(in_file(end_s), old.duration_s)
-        high = old.duration_s if old.duration_s - high < SHORTEST_REGION_S else high
-        if not high - low >= SHORTEST_REGION_S:
-            raise FacesynthError(f"an emotion needs at least {SHORTEST_REGION_S:g} s; got {start_s:g} to {end_s:g} s")
-        cut = _cut(old.emotions, low), _cut(old.emotions, high)
-        before = [region for region in cut[0] if region.end_s <= low]
-        after = [region for region in cut[1] if region.end_s > high]
-        return replace(old, emotions=_joined([*before, Region(emotion, high, _share(intensity)), *after]))
-
-    return document.changing(line, take, change)
+    low, high = in_file(max(0.0, start_s)), min(in_file(end_s), old.duration_s)
+    high = old.duration_s if old.duration_s - high < SHORTEST_REGION_S else high
+    if not high - low >= SHORTEST_REGION_S:
+        raise FacesynthError(f"an emotion needs at least {SHORTEST_REGION_S:g} s; got {start_s:g} to {end_s:g} s")
+    cut = _cut(old.emotions, low), _cut(old.emotions, high)
+    before = [region for region in cut[0] if region.end_s <= low]
+    after = [region for region in cut[1] if region.end_s > high]
+    return replace(old, emotions=_joined([*before, Region(emotion, high, _share(intensity)), *after]))
 
 
-def set_emotion(document: Document, line: str, take: str, region: int, emotion: str, intensity: float) -> Document:
+def set_emotion(old: Take, region: int, emotion: str, intensity: float) -> Take:
     """Change what is felt in a region."""
-
-    def change(old: Take) -> Take:
-        _require(old, region)
-        new = Region(emotion, old.emotions[region].end_s, _share(intensity))
-        return replace(old, emotions=(*old.emotions[:region], new, *old.emotions[region + 1 :]))
-
-    return document.changing(line, take, change)
+    _require(old, region)
+    new = Region(emotion, old.emotions[region].end_s, _share(intensity))
+    return replace(old, emotions=(*old.emotions[:region], new, *old.emotions[region + 1 :]))
 
 
-def move_emotion(document: Document, line: str, take: str, region: int, end_s: float) -> Document:
+def move_emotion(old: Take, region: int, end_s: float) -> Take:
     """Let a region end elsewhere."""
-
-    def change(old: Take) -> Take:
-        if not 0 <= region < len(old.emotions) - 1:
-            raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
-        low = (old.emotions[region - 1].end_s if region else 0.0) + SHORTEST_REGION_S
-        high = old.emotions[region + 1].end_s - SHORTEST_REGION_S
-        if not low <= end_s <= high:
-            raise FacesynthError(f"emotion {region} can end from {low:.3f} to {high:.3f} s; got {end_s:.3f} s")
-        new = old.emotions[region]._replace(end_s=in_file(end_s))
-        return replace(old, emotions=(*old.emotions[:region], new, *old.emotions[region + 1 :]))
-
-    return document.changing(line, take, change)
+    if not 0 <= region < len(old.emotions) - 1:
+        raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
+    low = (old.emotions[region - 1].end_s if region else 0.0) + SHORTEST_REGION_S
+    high = old.emotions[region + 1].end_s - SHORTEST_REGION_S
+    if not low <= end_s <= high:
+        raise FacesynthError(f"emotion {region} can end from {low:.3f} to {high:.3f} s; got {end_s:.3f} s")
+    new = old.emotions[region]._replace(end_s=in_file(end_s))
+    return replace(old, emotions=(*old.emotions[:region], new, *old.emotions[region + 1 :]))
 
 
-def set_curve(document: Document, line: str, take: str, points: Sequence[Sequence[float]]) -> Document:
+def set_curve(old: Take, points: Sequence[Sequence[float]]) -> Take:
     """Give the whole intensity curve; none: 1 throughout."""
-
-    def change(old: Take) -> Take:
-        try:
-            curve = tuple(CurvePoint(float(time_s), _share(value)) for time_s, value in points)
-        except (TypeError, ValueError):
-            raise FacesynthError("a curve is a list of moments in seconds and values from 0 to 1") from None
-        if any(a.time_s >= b.time_s for a, b in pairwise(curve)) or (curve and curve[0].time_s < 0):
-            raise FacesynthError("the moments of an intensity curve rise from 0 or later")
-        return replace(old, curve=curve)
-
-    return document.changing(line, take, change)
+    try:
+        curve = tuple(CurvePoint(float(time_s), _share(value)) for time_s, value in points)
+    except (TypeError, ValueError):
+        raise FacesynthError("a curve is a list of moments in seconds and values from 0 to 1") from None
+    if any(a.time_s >= b.time_s for a, b in pairwise(curve)) or (curve and curve[0].time_s < 0):
+        raise FacesynthError("the moments of an intensity curve rise from 0 or later")
+    return replace(old, curve=curve)
 
 
-def cross_fade(document: Document, line: str, take: str, region: int, length_s: float) -> Document:
+def cross_fade(old: Take, region: int, length_s: float) -> Take:
     """Let one emotion fade out and the next fade in around their boundary: the curve falls to 0 there and rises again."""
-
-    def change(old: Take) -> Take:
-        if not 0 <= region < len(old.emotions) - 1:
-            raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
-        middle = old.emotions[region].end_s
-        low, high = max(0.0, middle - length_s / 2), min(old.duration_s, middle + length_s / 2)
-        if not low < middle < high:
-            raise FacesynthError(f"a cross-fade needs a length above 0 s; got {length_s:g}")
-        curve = IntensityCurve(*np.array(old.curve or ((0.0, 1.0),)).T)
-        beside = [float(np.interp(at, curve.times_s, curve.intensities)) for at in (low, high)]
-        kept = [point for point in old.curve if not low <= point.time_s <= high]
-        points = [*kept, CurvePoint(low, beside[0]), CurvePoint(middle, 0.0), CurvePoint(high, beside[1])]
-        return replace(old, curve=tuple(sorted(points)))
-
-    return document.changing(line, take, change)
+    if not 0 <= region < len(old.emotions) - 1:
+        raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
+    middle = old.emotions[region].end_s
+    low, high = max(0.0, middle - length_s / 2), min(old.duration_s, middle + length_s / 2)
+    if not low < middle < high:
+        raise FacesynthError(f"a cross-fade needs a length above 0 s; got {length_s:g}")
+    curve = IntensityCurve(*np.array(old.curve or ((0.0, 1.0),)).T)
+    beside = [float(np.interp(at, curve.times_s, curve.intensities)) for at in (low, high)]
+    kept = [point for point in old.curve if not low <= point.time_s <= high]
+    points = [*kept, CurvePoint(low, beside[0]), CurvePoint(middle, 0.0), CurvePoint(high, beside[1])]
+    return replace(old, curve=tuple(sorted(points)))
 
 
 def _require(take: Take, region: int) -> None:

@@ -60,14 +60,10 @@ def set_phones(
     return changed.with_line(replace(changed.line(line), text=text))
 
 
-def set_option(document: Document, line: str, take: str, name: str, value: str | float | bool | None) -> Document:
+def set_option(old: Take, name: str, value: str | float | bool | None) -> Take:
     """Ask something of `speak`, such as seed or mouth; None: as it is by default."""
-
-    def change(old: Take) -> Take:
-        options = {**dict(old.options), name: value}
-        return replace(old, options=tuple(sorted((key, kept) for key, kept in options.items() if kept is not None)))
-
-    return document.changing(line, take, change)
+    options = {**dict(old.options), name: value}
+    return replace(old, options=tuple(sorted((key, kept) for key, kept in options.items() if kept is not None)))
 
 
 def remove_node(document: Document, node: str) -> Document:
