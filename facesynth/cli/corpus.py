@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.corpus_edit import edit, show
+from facesynth.cli.corpus_edit import edit
 from facesynth.cli.followed_points import Followed, keep_videos_of, points_followed, require_points
 from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_files
+from facesynth.cli.options import as_json, show, spread_over
 from facesynth.cli.transcriber import chosen_transcriber
+from facesynth.cli.types import FILE, FOLDER
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
     from facesynth.corpus.add.add import AddReport
-    from facesynth.corpus.workers import Engine, Workers
+    from facesynth.corpus.workers import Workers
 
 EMOTIONS = ("neutral", "happy", "angry", "sad")
 """Those of a corpus for which nobody says them."""
@@ -29,30 +29,6 @@ FACTS = ("emotion", "intensity", "take", "sentence", "licence", "consent")
 """Options of `add` that are columns of utterances.csv."""
 MOST_NAMED = 8
 """So many recordings are named on the screen; import.csv names all."""
-FOLDER = click.Path(file_okay=False, path_type=Path)
-FILE = click.Path(path_type=Path)
-as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-
-
-WHO = (
-    click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Tasks at once; all cores otherwise."),
-    click.option("--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works."),
-    click.option("--address", default="", help="Of a Ray cluster that sees the same files; this computer otherwise."),
-)
-
-
-def spread_over(command: Any) -> Any:
-    """Who does the work: the options --jobs, --engine and --address, which the command gets as `workers`."""
-
-    @wraps(command)
-    def with_workers(*, jobs: int, engine: Engine, address: str, **options: Any) -> None:
-        from facesynth.corpus.workers import Workers
-
-        command(workers=Workers(jobs, engine, address), **options)
-
-    for option in reversed(WHO):
-        with_workers = option(with_workers)
-    return with_workers
 
 
 @click.group("corpus")
@@ -66,9 +42,7 @@ corpus_group.add_command(edit)
 @corpus_group.command("new")
 @click.argument("folder", type=FOLDER)
 @click.option("--performer", required=True, help="Who was recorded.")
-@click.option(
-    "--layout", "layout_file", type=FILE, required=True, help="YAML or JSON that names the channels, or another corpus.yaml."
-)
+@click.option("--layout", "layout_file", type=FILE, required=True, help="Names of channels: YAML, JSON, another corpus.yaml.")
 @click.option("--fps", type=float, required=True, help="Rate at which the motion is kept; files of another rate are resampled.")
 @click.option("--emotions", default=",".join(EMOTIONS), show_default=True, help="The emotions that the corpus tells apart.")
 @click.option("--licence", default="", help="Of every recording that states none of its own; carried into every model.")
@@ -83,17 +57,9 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
     names = [name.strip() for name in emotions.split(",") if name.strip()]
     corpus = Corpus.create(folder, layout=read_layout(layout_file), emotions=names, **about)
     keep_written_of(folder, layout_file)
-    facts = {
-        "path": str(corpus.path),
-        "performer": corpus.performer,
-        "channels": corpus.layout.channels,
-        "emotions": corpus.emotions,
-    }
-    show(
-        as_json,
-        facts,
-        [f"{folder} is a corpus of {corpus.performer}; add recordings with `facesynth corpus add {folder} FILES…`"],
-    )
+    facts = {name: getattr(corpus, name) for name in ("performer", "emotions")}
+    facts |= {"path": str(corpus.path), "channels": corpus.layout.channels}
+    show(as_json, facts, [f"{folder} is a corpus of {corpus.performer}; add with `facesynth corpus add {folder} FILES…`"])
 
 
 @corpus_group.command("add")
@@ -118,15 +84,10 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--sound", type=FILE, help="One long sound of a recorder that ran on for several videos: each finds its part.")
 @click.option("--face", type=click.IntRange(min=1), help="Which face of a video with several: 1 is the leftmost.")
 @click.option("--performer", help="Who was recorded, where FOLDER is no corpus yet; its name otherwise.")
-@click.option(
-    "--replace",
-    "replacing",
-    is_flag=True,
-    help="Also phones corrected by hand, and recordings of the same name from another folder.",
-)
+@click.option("--replace", "replacing", is_flag=True, help="Also phones corrected by hand, and a name from another folder.")
 @points_followed
 @said_of_files
-@spread_over
+@spread_over()
 @as_json
 def add(
     *,
@@ -201,7 +162,7 @@ def convert(files: tuple[Path, ...], folder: Path, said: Said, as_json: bool) ->
 @click.argument("folder", type=FOLDER)
 @click.option("--id", "ids", multiple=True, help="Only this utterance; may be given several times.")
 @click.option("--force", is_flag=True, help="Also where phones were given or corrected by hand.")
-@spread_over
+@spread_over()
 @as_json
 def align(folder: Path, ids: tuple[str, ...], force: bool, workers: Workers, as_json: bool) -> None:
     """Place the phones of utterances with a text anew; what was corrected by hand stays."""

@@ -1,6 +1,5 @@
 """`facesynth corpus edit`: nodes that a corpus's models may use. Recordings are never touched; edits.jsonl only grows."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -8,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.options import as_json, show
+from facesynth.cli.types import FILE, FOLDER
+
 if TYPE_CHECKING:
     from facesynth.corpus.journal import Edit
-
-FOLDER = click.Path(file_okay=False, path_type=Path)
-FILE = click.Path(path_type=Path)
-as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 
 
 @click.group("edit")
@@ -172,8 +170,3 @@ def _said(one: "Edit") -> str:
         title = f" {facts['title']!r}" if facts.get("title") else ""
         return f"add +:{one.number}{title} ({facts['phone']}, {facts['emotion']}, {len(facts['frames'])} frames)"
     return f"undo {facts['of']}" if one.op == "undo" else f"{one.op} {facts['node']}"
-
-
-def show(as_json: bool, facts: Any, lines: Iterable[str]) -> None:
-    """Print what a verb found: all facts as JSON, or lines for people."""
-    click.echo(json.dumps(facts, ensure_ascii=False, indent=2) if as_json else "\n".join(lines))

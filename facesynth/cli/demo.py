@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from facesynth.cli.types import Size
+from facesynth.cli.options import as_json, seeded, show
+from facesynth.cli.types import FOLDER, Size
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -43,12 +44,10 @@ class Clock:
 
 
 @click.command("demo")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), default=Path("facesynth-demo"), show_default=True
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("-o", "--output", type=FOLDER, default=Path("facesynth-demo"), show_default=True)
+@seeded
 @click.option("--size", type=Size(), show_default="1280x720", help="Of the video.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@as_json
 def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -> None:
     """Let the model that speaks for anybody say a sentence; then build the synthetic performer, train a method on it and let
     that say it through three emotions.
@@ -193,9 +192,6 @@ def _report(clock: Clock, written: list[Path], fresh: bool, corpus: Path, as_jso
     first = json.loads(kept.read_text(encoding="utf-8"))["first_run_s"] if kept.exists() else None
     facts: dict[str, Any] = {"seconds": clock.total_s, "first_run_s": first, "steps_s": clock.seconds}
     facts |= {"written": [str(path) for path in written], "corpus": str(corpus), "synthetic": True}
-    if as_json:
-        click.echo(json.dumps(facts))
-        return
     again = "" if fresh or first is None else f"; the first run, which built everything, took {first:.1f} s"
-    click.echo(f"done in {clock.total_s:.1f} s{again}")
-    click.echo(f"watch {written[-2]}; the synthetic performer's recordings are in {corpus}")
+    done = f"done in {clock.total_s:.1f} s{again}"
+    show(as_json, facts, [done, f"watch {written[-2]}; the synthetic performer's recordings are in {corpus}"])

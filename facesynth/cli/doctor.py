@@ -1,6 +1,5 @@
 """`facesynth doctor`."""
 
-import json
 import platform
 import sys
 from dataclasses import asdict, dataclass
@@ -8,6 +7,8 @@ from importlib import metadata
 from typing import Any
 
 import click
+
+from facesynth.cli.options import as_json, show
 
 CORE = ("numpy", "scipy", "onnxruntime", "onnx", "numba", "av", "soundfile", "pocketsphinx", "hama", "safetensors")
 """Distributions whose versions matter most where something goes wrong."""
@@ -26,16 +27,16 @@ class Finding:
 
 
 @click.command("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@as_json
 def doctor(as_json: bool) -> None:
     """Print versions, devices, caches, and what is missing with the command that brings it. Nothing is changed or fetched."""
     findings = [*_versions(), *_devices(), *_extras(), *_caches()]
-    if as_json:
-        click.echo(json.dumps([asdict(one) for one in findings]))
-        return
-    for one in findings:
-        note = f"  for {one.needed_for}" if one.needed_for else ""
-        click.echo(f"{one.what:24} {one.found}{note}{f': {one.to_do}' if one.to_do else ''}")
+    show(as_json, [asdict(one) for one in findings], map(_line, findings))
+
+
+def _line(one: Finding) -> str:
+    note = f"  for {one.needed_for}" if one.needed_for else ""
+    return f"{one.what:24} {one.found}{note}{f': {one.to_do}' if one.to_do else ''}"
 
 
 def _versions() -> list[Finding]:

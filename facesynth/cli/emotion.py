@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from facesynth.cli.options import as_json, show
+from facesynth.cli.types import FILE
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
@@ -20,19 +21,14 @@ if TYPE_CHECKING:
 
 
 @click.command("emotion")
-@click.argument("model", type=click.Path(path_type=Path))
-@click.argument("speech", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("model", type=FILE)
+@click.argument("speech", nargs=-1, required=True, type=FILE)
 @click.option("--windows", is_flag=True, help="Follow the emotion over time.")
 @click.option("--window-s", type=click.FloatRange(min=0.2), default=2.0, show_default=True, help="Length of a window.")
 @click.option("--hop-s", type=click.FloatRange(min=0.05), default=0.5, show_default=True, help="Step between windows.")
-@click.option(
-    "--speaker",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    help="Recordings of the same speaker, for a detector that normalises; folders or files.",
-)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write an emotion track for `speak --emotions` (CSV).")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option("--speaker", multiple=True, type=FILE, help="More of the same speaker (files, folders), for one that normalises.")
+@click.option("-o", "--output", type=FILE, help="Write an emotion track for `speak --emotions` (CSV).")
+@as_json
 def emotion(
     *,
     model: Path,
@@ -59,11 +55,7 @@ def emotion(
     own = _features(detector, recordings(speaker)) if speaker else None
     span = (window_s, hop_s) if windows else None
     results = [_read(detector, path, own, span, output) for path in paths]
-    if as_json:
-        click.echo(json.dumps(results if len(results) > 1 else results[0]))
-        return
-    for result in results:
-        _show(result)
+    show(as_json, results if len(results) > 1 else results[0], [line for result in results for line in _lines(result)])
 
 
 def _features(detector: EmotionDetector, paths: list[Path]) -> NDArray[np.float64]:
@@ -108,16 +100,13 @@ def _read(
     return facts
 
 
-def _show(facts: dict[str, Any]) -> None:
+def _lines(facts: dict[str, Any]) -> list[str]:
     if "emotion" in facts:
         likely = sorted(facts["probabilities"].items(), key=lambda item: -item[1])
-        click.echo(f"{facts['speech']}: {facts['emotion']} ({', '.join(f'{name} {p:.2f}' for name, p in likely)})")
-        return
-    click.echo(f"{facts['speech']}:")
-    start = 0.0
-    for row in facts["track"]:
-        click.echo(f"  {start:7.2f} to {row['end_s']:7.2f} s  {row['emotion']}")
-        start = row["end_s"]
+        return [f"{facts['speech']}: {facts['emotion']} ({', '.join(f'{name} {p:.2f}' for name, p in likely)})"]
+    starts_s = [0.0, *(row["end_s"] for row in facts["track"])]
+    spans = zip(starts_s, facts["track"], strict=False)
+    return [f"{facts['speech']}:", *(f"  {start:7.2f} to {row['end_s']:7.2f} s  {row['emotion']}" for start, row in spans)]
 
 
 def train_detector(
@@ -141,14 +130,9 @@ def train_detector(
         clips = clips_of_list(source)
         unknown = {"licences": ["unknown"], "consents": ["unknown"]}
         detector.provenance = {"recordings": source.name, "clips": len(clips), **unknown}
-        click.echo(
-            f"warning: {source} states no licences or consents, as a corpus does; the detector says that they are unknown",
-            err=True,
-        )
+        click.echo(f"warning: {source} states no licences or consents; the detector says that they are unknown", err=True)
     detector.fit(clips, workers).save(output)
     facts = {"model": str(output), "method": "emotion", "recordings": len(clips), "emotions": list(detector.emotions)}
-    if as_json:
-        click.echo(json.dumps(facts))
-        return
-    click.echo(f"emotion learned {', '.join(detector.emotions)} from {len(clips)} recordings")
-    click.echo(f"{output}: listen with `facesynth emotion {output} speech.wav`, or put it beside a model for `--emotion auto`")
+    use = f"listen with `facesynth emotion {output} speech.wav`, or put it beside a model for `--emotion auto`"
+    learned = f"emotion learned {', '.join(detector.emotions)} from {len(clips)} recordings"
+    show(as_json, facts, [learned, f"{output}: {use}"])

@@ -7,46 +7,38 @@ from typing import TYPE_CHECKING
 
 import click
 
+from facesynth.cli.options import as_json, seeded, spread_over
+from facesynth.cli.types import FILE, FOLDER
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from facesynth.corpus import Corpus
-    from facesynth.corpus.workers import Engine, Workers
+    from facesynth.corpus.workers import Workers
     from facesynth.evaluation.compare import Evaluation
     from facesynth.evaluation.contestants import Contestant, Family
     from facesynth.evaluation.folds import Fold
 
 
 @click.command("evaluate")
-@click.argument("corpus", type=click.Path(path_type=Path))
+@click.argument("corpus", type=FILE)
 @click.argument("methods", nargs=-1, metavar="[METHOD[:SETTINGS.yaml]]...")
-@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the report.")
-@click.option(
-    "--family", "families", multiple=True, type=click.Path(path_type=Path), help="A file of variants; see configs/ablations."
-)
+@click.option("-o", "--output", type=FOLDER, required=True, help="Folder of the report.")
+@click.option("--family", "families", multiple=True, type=FILE, help="A file of variants; see configs/ablations.")
 @click.option("--folds", default=5, show_default=True, help="Splits by sentence.")
-@click.option("--given-folds", type=click.Path(path_type=Path), help="JSON of folds in place of drawn ones.")
+@click.option("--given-folds", type=FILE, help="JSON of folds in place of drawn ones.")
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes of each fold.")
-@click.option(
-    "--minutes",
-    multiple=True,
-    type=click.FloatRange(0.01),
-    help="Each method also by so many minutes of each fold; may be repeated.",
-)
+@click.option("--minutes", multiple=True, type=click.FloatRange(0.01), help="Each method also by so many minutes of each fold.")
 @click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all.")
-@click.option(
-    "--from-predictions", "stored", type=click.Path(path_type=Path), help="Judge METHOD/ID.npz of this folder; train nothing."
-)
+@click.option("--from-predictions", "stored", type=FILE, help="Judge METHOD/ID.npz of this folder; train nothing.")
 @click.option("--no-references", is_flag=True, help="Leave out the reference methods, such as the mean face.")
 @click.option("--show", "shown", multiple=True, metavar="ID", help="Utterances for trajectories and video.")
 @click.option("--no-video", is_flag=True, help="Leave out the videos.")
 @click.option("--title", default="", help="Of the report.")
-@click.option("--workers", default=1, show_default=True, help="Processes at once; each keeps to one thread.")
-@click.option("--engine", default="processes", show_default=True, help="processes, or ray.")
-@click.option("--address", default="", help="Of a Ray cluster whose machines see the same files.")
+@spread_over("--workers", 1, "Processes at once; each keeps to one thread.")
 @click.option("--device", default="cpu", show_default=True, help="Where methods learn and speak: cpu, cuda, mps or auto.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@seeded
+@as_json
 def evaluate(
     *,
     corpus: Path,
@@ -63,9 +55,7 @@ def evaluate(
     shown: tuple[str, ...],
     no_video: bool,
     title: str,
-    workers: int,
-    engine: Engine,
-    address: str,
+    workers: Workers,
     device: str,
     seed: int,
     as_json: bool,
@@ -76,14 +66,12 @@ def evaluate(
     goes on where it was.
     """
     from facesynth.corpus import Corpus
-    from facesynth.corpus.workers import Workers
     from facesynth.device import device_of
     from facesynth.evaluation.folds import make_folds, read_folds
     from facesynth.evaluation.report import Wish, require_drawing, write_report
 
     if stored is not None:
         _refuse_training()
-    team = Workers(workers, engine, address)
     require_drawing()
     device_of(device)
     recordings = Corpus.open(corpus)
@@ -95,7 +83,7 @@ def evaluate(
         if not methods and not families:
             raise click.UsageError("name a method, a --family or --from-predictions")
         splits = splits or make_folds(recordings, folds, seed, test_limit=test_limit, train_minutes=train_minutes)
-    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=team, device=device)
+    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=workers, device=device)
     page = write_report(output, result, recordings, known, Wish(title or recordings.performer, shown, videos=not no_video))
     if as_json:
         click.echo(result.comparison.json())
@@ -106,19 +94,12 @@ def evaluate(
 
 def _refuse_training() -> None:
     """UsageError where something was asked of a training that `--from-predictions` does without."""
-    names = {
-        "methods": "METHOD",
-        "folds": "--folds",
-        "train_minutes": "--train-minutes",
-        "minutes": "--minutes",
-        "test_limit": "--test-limit",
-    }
     source = click.get_current_context().get_parameter_source
-    given = [shown for name, shown in names.items() if source(name) is click.core.ParameterSource.COMMANDLINE]
+    names = ("methods", "folds", "train_minutes", "minutes", "test_limit")
+    given = [name for name in names if source(name) is click.core.ParameterSource.COMMANDLINE]
     if given:
-        raise click.UsageError(
-            f"--from-predictions trains nothing; leave out {', '.join(given)} (--given-folds chooses utterances)"
-        )
+        shown = ", ".join("METHOD" if name == "methods" else "--" + name.replace("_", "-") for name in given)
+        raise click.UsageError(f"--from-predictions trains nothing; leave out {shown} (--given-folds chooses utterances)")
 
 
 def _contestants(

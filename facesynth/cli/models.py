@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.options import as_json, show
+from facesynth.cli.types import FILE
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.zoo.shelf import Entry
 
-JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-
 
 @click.command("models")
 @click.argument("name", required=False)
-@JSON
+@as_json
 def models(name: str | None, as_json: bool) -> None:
     """List the models that can be used at once; with NAME, show the card of one."""
     from facesynth.zoo.shelf import DEFAULT, entry, names
 
     entries = [entry(one) for one in ([name] if name else names())]
-    if as_json:
-        click.echo(json.dumps([_facts(one) for one in entries]))
-    elif name:
-        click.echo(_shown(entries[0]))
-    else:
-        for one in entries:
-            head = f"{one.name}{' (default)' if one.name == DEFAULT else ''}"
-            click.echo(
-                f"{head:24} {one.part:10} {one.method:16} {one.layout:16} {one.size_bytes / 1e6:5.1f} MB  {one.card.title}"
-            )
+    show(as_json, [_facts(one) for one in entries], [_shown(entries[0])] if name else [_listed(one, DEFAULT) for one in entries])
+
+
+def _listed(one: Entry, default: str) -> str:
+    head = f"{one.name}{' (default)' if one.name == default else ''}"
+    return f"{head:24} {one.part:10} {one.method:16} {one.layout:16} {one.size_bytes / 1e6:5.1f} MB  {one.card.title}"
 
 
 def _facts(one: Entry) -> dict[str, Any]:
@@ -57,8 +52,8 @@ def _shown(one: Entry) -> str:
 
 
 @click.command("card")
-@click.argument("model", type=click.Path(path_type=Path))
-@JSON
+@click.argument("model", type=FILE)
+@as_json
 def card(model: Path, as_json: bool) -> None:
     """Write the card of MODEL, a file or an exported folder: performer, licence and consent as it states them.
 
@@ -74,19 +69,16 @@ def card(model: Path, as_json: bool) -> None:
     target = path / CARD if path.is_dir() else path.with_name(f"{path.stem}.{CARD}")
     if not target.exists():
         trained: Any = load_trained(path)
-        write_card(
-            target, draft(f"{trained.name} of {trained.provenance.get('performer', 'an unknown performer')}", trained.provenance)
-        )
+        performer = trained.provenance.get("performer", "an unknown performer")
+        write_card(target, draft(f"{trained.name} of {performer}", trained.provenance))
     found = read_card(target)
-    click.echo(
-        json.dumps({"card": str(target), **asdict(found)}) if as_json else f"{target}: {found.title}; licence: {found.licence}"
-    )
+    show(as_json, {"card": str(target), **asdict(found)}, [f"{target}: {found.title}; licence: {found.licence}"])
 
 
 @click.command("push")
-@click.argument("model", type=click.Path(path_type=Path))
-@click.argument("folder", type=click.Path(path_type=Path))
-@JSON
+@click.argument("model", type=FILE)
+@click.argument("folder", type=FILE)
+@as_json
 def push(model: Path, folder: Path, as_json: bool) -> None:
     """Write MODEL, an exported folder with a card, into one file in FOLDER, which `pull` takes from there or from a URL."""
     from facesynth.methods.trained import is_exported
@@ -98,15 +90,14 @@ def push(model: Path, folder: Path, as_json: bool) -> None:
             f"{source} is no exported folder; run `facesynth export {source} -o NAME/` and `facesynth card NAME/`"
         )
     path, sha256 = write_parcel(source, folder)
-    size = path.stat().st_size
-    facts = {"file": str(path), "sha256": sha256, "bytes": size}
-    click.echo(json.dumps(facts) if as_json else f"{path}: {size / 1e6:.2f} MB, sha256 {sha256}")
+    facts = {"file": str(path), "sha256": sha256, "bytes": path.stat().st_size}
+    show(as_json, facts, [f"{path}: {path.stat().st_size / 1e6:.2f} MB, sha256 {sha256}"])
 
 
 @click.command("pull")
 @click.argument("source")
 @click.option("--sha256", help="That the file must have, as `push` printed it.")
-@JSON
+@as_json
 def pull(source: str, sha256: str | None, as_json: bool) -> None:
     """Keep the model in SOURCE, a file or URL that you trust to be reached, so that `speak` knows it by its name.
 
@@ -115,4 +106,4 @@ def pull(source: str, sha256: str | None, as_json: bool) -> None:
     from facesynth.zoo.parcel import pull as take
 
     one = take(source, sha256=sha256)
-    click.echo(json.dumps(_facts(one)) if as_json else f"{one.name}: {one.card.title}; licence: {one.card.licence}")
+    show(as_json, _facts(one), [f"{one.name}: {one.card.title}; licence: {one.card.licence}"])

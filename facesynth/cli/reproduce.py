@@ -2,35 +2,25 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
+
+from facesynth.cli.options import as_json, seeded
+from facesynth.cli.types import FILE
 
 TYPES = (".html", ".md", ".csv", ".json")
 
 
 @click.command("reproduce")
 @click.argument("paper")
-@click.argument("corpus", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="File to write: .html with pictures, .md, .csv or .json.",
-)
+@click.argument("corpus", type=FILE)
+@click.option("-o", "--output", type=FILE, help="File to write: .html with pictures, .md, .csv or .json.")
 @click.option("--train-minutes", type=click.FloatRange(0.01), help="Learn from so many minutes.")
 @click.option("--test-limit", type=click.IntRange(min=2), default=24, show_default=True, help="Utterances tested.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def reproduce(
-    *,
-    paper: str,
-    corpus: Path,
-    output: Path | None,
-    train_minutes: float | None,
-    test_limit: int,
-    seed: int,
-    as_json: bool,
-) -> None:
+@seeded
+@as_json
+def reproduce(paper: str, corpus: Path, output: Path | None, as_json: bool, **limits: Any) -> None:
     """Run what can be run of PAPER (cao2005, deng2008, deng2006, saisan2004) on CORPUS.
 
     Printed are the paper's figure, ours, and whether the two can be compared; what is missing is listed as missing.
@@ -44,7 +34,7 @@ def reproduce(
     if output and output.suffix not in TYPES:
         raise unknown("output type", output.suffix or str(output), TYPES)
     require_drawing()
-    result = run(paper, Corpus.open(corpus), train_minutes=train_minutes, test_limit=test_limit, seed=seed)
+    result = run(paper, Corpus.open(corpus), **limits)
     plain = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     if output:
         write_text(output, plain if output.suffix == ".json" else result.written_as(output.suffix))

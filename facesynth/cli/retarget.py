@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from facesynth.cli.options import as_json, show
 from facesynth.cli.targets import plan_targets
+from facesynth.cli.types import FILE
 from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
@@ -16,21 +17,21 @@ if TYPE_CHECKING:
 
 
 @click.command("retarget")
-@click.argument("corpus", type=click.Path(path_type=Path))
-@click.argument("poses", type=click.Path(path_type=Path))
+@click.argument("corpus", type=FILE)
+@click.argument("poses", type=FILE)
 @click.argument("motions", nargs=-1)
 @click.option(
     "-o",
     "--output",
     "outputs",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="File to write: .csv .npz .bvh, with --rig also .glb; {name} stands for the name of the motion.",
 )
-@click.option("--rig", type=click.Path(path_type=Path), help="The head: .glb, .gltf, or a folder of OBJ files.")
+@click.option("--rig", type=FILE, help="The head: .glb, .gltf, or a folder of OBJ files.")
 @click.option("--suggest", type=click.IntRange(min=2), help="Write POSES: so many frames worth posing, weights to be filled in.")
-@click.option("--export", "exported", type=click.Path(path_type=Path), help="Folder for what was learned, as an ONNX graph.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option("--export", "exported", type=FILE, help="Folder for what was learned, as an ONNX graph.")
+@as_json
 def retarget(
     *,
     corpus: Path,
@@ -79,7 +80,7 @@ def retarget(
 
         export_key_poses(exported, found, recordings.provenance())
         written.append(str(exported))
-    click.echo(json.dumps({"key_poses": len(given.frames), "written": written}) if as_json else "", nl=as_json)
+    show(as_json, {"key_poses": len(given.frames), "written": written}, [])
 
 
 def _suggest(corpus: Corpus, poses: Path, count: int, channels: tuple[str, ...]) -> None:

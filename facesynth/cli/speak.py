@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.cli.options import as_json, seeded, show
 from facesynth.cli.recordings import is_recording, recordings
 from facesynth.cli.targets import plan_targets, require_free
 from facesynth.cli.transcriber import chosen_transcriber
@@ -143,8 +143,8 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
     help="Real face: recorded pictures that follow each other well, or simply the nearest.",
 )
 @click.option("--device", default="auto", show_default=True, help="Where the model runs: auto, cpu, cuda or mps.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@seeded
+@as_json
 def speak(
     *,
     given: tuple[Path, ...],
@@ -181,7 +181,7 @@ def speak(
         _say_all(production, plan, as_json)
         return
     spoken = production.say(paths[0], plan[paths[0]], _tell)
-    click.echo(json.dumps(spoken.facts) if as_json else "", nl=as_json)
+    show(as_json, spoken.facts, [])
 
 
 def _model_and_speech(given: tuple[Path, ...]) -> tuple[Path, tuple[Path, ...]]:
@@ -229,8 +229,7 @@ def _say_all(production: Production, plan: dict[Path, list[Path]], as_json: bool
         except FacesynthError as error:
             _tell(f"error: {error}")
             failed.append(path.name)
-    if as_json:
-        click.echo(json.dumps(results))
+    show(as_json, results, [])
     if failed:
         raise FacesynthError(f"{len(failed)} of {len(plan)} recordings were not spoken: {', '.join(failed)}")
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from facesynth.cli.types import FILE
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from facesynth.inference.speech import Speech
     from facesynth.speech.segments import Segment
-
-FILE = click.Path(path_type=Path)
 
 
 @click.command("studio")

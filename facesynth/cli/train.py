@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from facesynth.cli.options import as_json, seeded, show, spread_over
+from facesynth.cli.types import FILE
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -18,19 +20,15 @@ if TYPE_CHECKING:
 
 @click.command("train")
 @click.argument("method", required=False)
-@click.argument("corpus", type=click.Path(path_type=Path), required=False)
+@click.argument("corpus", type=FILE, required=False)
 @click.argument("settings", nargs=-1, metavar="[KEY=VALUE]...")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Model file; METHOD.safetensors in this folder otherwise.")
-@click.option("--config", type=click.Path(path_type=Path), help="YAML file of settings; KEY=VALUE goes before it.")
-@click.option(
-    "--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Which sentences to learn from."
-)
+@click.option("-o", "--output", type=FILE, help="Model file; METHOD.safetensors in this folder otherwise.")
+@click.option("--config", type=FILE, help="YAML file of settings; KEY=VALUE goes before it.")
+@click.option("--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Sentences to learn from.")
 @click.option("--device", help="auto (the default), cpu, cuda or mps; `device` of --config otherwise.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, help="METHOD emotion: voices at once.")
-@click.option("--engine", type=click.Choice(["processes", "ray"]), default="processes", show_default=True, help="Who works.")
-@click.option("--address", default="", help="Of a Ray cluster that sees the same files; this computer otherwise.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@seeded
+@spread_over("--jobs", 1, "METHOD emotion: voices at once; 1 otherwise.")
+@as_json
 def train(
     *,
     method: str | None,
@@ -42,7 +40,7 @@ def train(
     device: str | None,
     seed: int,
     as_json: bool,
-    **who: Any,
+    workers: Workers,
 ) -> None:
     """Train METHOD on CORPUS and write one model file; without METHOD, what is nearest to recordings, as it is nearest.
 
@@ -54,7 +52,6 @@ def train(
     of CORPUS, or of one that comes with facesynth, by its name (`arkit`): nothing is recorded for it.
     """
     from facesynth.config import load_config, parse_settings
-    from facesynth.corpus.workers import Workers
     from facesynth.device import device_of
     from facesynth.methods.registry import method_class, of_table
     from facesynth.methods.training import train as learn
@@ -62,7 +59,7 @@ def train(
 
     method, corpus, settings, known = _asked(method, corpus, settings)
     chosen = {**(load_config(config) if config else known), **parse_settings(settings)}
-    place, workers = device_of(device or str(chosen.pop("device", "auto"))), Workers(**who)
+    place = device_of(device or str(chosen.pop("device", "auto")))
     path = output or Path(f"{method}.safetensors")
     if method == "emotion":
         from facesynth.cli.emotion import train_detector
@@ -97,19 +94,16 @@ def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | No
     size_mb = path.stat().st_size / 1e6
     facts = {"model": str(path), "method": model.name, "utterances": len(recordings), "train_s": seconds, "model_mb": size_mb}
     facts |= _left_out(model.facts)
-    if as_json:
-        click.echo(json.dumps({**facts, "synthetic": recordings.synthetic}))
-        return
     kind = "synthetic performer" if recordings.synthetic else "performer"
-    click.echo(f"{model.name} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s")
+    lines = [f"{model.name} learned from {len(recordings)} utterances of the {kind} {recordings.performer} in {seconds:.1f} s"]
     if moved := model.facts.get("repaired"):
         moduli = ", ".join(f"{modulus:.3f}" for modulus in moved)
-        click.echo(f"unstable: eigenvalues of modulus {moduli} were moved inside, the rest refitted")
-    for sentence in model.facts.get("findings", ()):
-        click.echo(sentence)
+        lines.append(f"unstable: eigenvalues of modulus {moduli} were moved inside, the rest refitted")
+    lines += model.facts.get("findings", ())
     if face:
-        click.echo(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
-    click.echo(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+        lines.append(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
+    lines.append(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+    show(as_json, {**facts, "synthetic": recordings.synthetic}, lines)
 
 
 def _asked(
@@ -129,11 +123,9 @@ def _asked(
 
 
 def _tell_made(path: Path, method: str, channels: int, *, as_json: bool) -> None:
-    if as_json:
-        click.echo(json.dumps({"model": str(path), "method": method, "channels": channels}))
-        return
-    click.echo(f"{path}: {method} of shapes by hand, {channels} channels; nothing was learned from anybody's recordings of them")
-    click.echo(f'speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+    made = f"{path}: {method} of shapes by hand, {channels} channels; nothing was learned from anybody's recordings of them"
+    lines = [made, f'speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`']
+    show(as_json, {"model": str(path), "method": method, "channels": channels}, lines)
 
 
 def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,36 +1,29 @@
 """`facesynth tune`."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from pkgutil import resolve_name
+from typing import Any
 
 import click
 
+from facesynth.cli.options import as_json, seeded, show
+from facesynth.cli.types import FILE
+
 
 @click.command("tune")
-@click.argument("corpus", type=click.Path(path_type=Path))
+@click.argument("corpus", type=FILE)
 @click.option("--method", help="Whose settings; the one whose settings can be searched, where there is one.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Settings file; METHOD-tuned.yaml otherwise.")
+@click.option("-o", "--output", type=FILE, help="Settings file; METHOD-tuned.yaml otherwise.")
 @click.option("--sentences", default=24, show_default=True, help="To tune on; none of them is learned from.")
 @click.option("--test", "test_sentences", default=12, show_default=True, help="To compare found and published settings on.")
 @click.option("--generations", default=10, show_default=True, help="Of 28 evaluations each, after the first.")
 @click.option("--limit", type=click.IntRange(min=2), help="Learn from at most so many utterances, evenly chosen.")
 @click.option("--workers", default=2, show_default=True)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@seeded
+@as_json
 def tune(
-    *,
-    corpus: Path,
-    method: str | None,
-    output: Path | None,
-    sentences: int,
-    test_sentences: int,
-    generations: int,
-    limit: int | None,
-    workers: int,
-    seed: int,
-    as_json: bool,
+    *, corpus: Path, method: str | None, output: Path | None, sentences: int, test_sentences: int, as_json: bool, **limits: Any
 ) -> None:
     """Search a method's settings on held-out sentences of CORPUS; interrupted, it goes on where it was."""
     import yaml
@@ -40,22 +33,12 @@ def tune(
 
     name, tuner = _tuner(method)
     output = output or Path(f"{name}-tuned.yaml")
-    found = resolve_name(tuner)(
-        Corpus.open(corpus),
-        journal=output.with_suffix(".jsonl"),
-        sentences=sentences,
-        test_sentences=test_sentences,
-        generations=generations,
-        limit=limit,
-        seed=seed,
-        workers=workers,
-    )
+    counts = {"sentences": sentences, "test_sentences": test_sentences, **limits}
+    found = resolve_name(tuner)(Corpus.open(corpus), journal=output.with_suffix(".jsonl"), **counts)
     write_text(output, yaml.safe_dump({k: float(f"{v:.4g}") for k, v in found.settings.items()}, sort_keys=False))
-    if as_json:
-        click.echo(json.dumps(asdict(found)))
-        return
-    click.echo(f"{found.evaluations} evaluations on {sentences} sentences; {output} holds the settings")
-    click.echo(f"on {test_sentences} other sentences: found {found.test_error:.4g}, published {found.published_test_error:.4g}")
+    tuned = f"{found.evaluations} evaluations on {sentences} sentences; {output} holds the settings"
+    errors = f"found {found.test_error:.4g}, published {found.published_test_error:.4g}"
+    show(as_json, asdict(found), [tuned, f"on {test_sentences} other sentences: {errors}"])
 
 
 def _tuner(method: str | None) -> tuple[str, str]:
