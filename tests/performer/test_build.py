@@ -93,7 +93,7 @@ def test_an_interrupted_build_goes_on_to_the_same_bytes(built, short_script, tmp
 
 def test_a_killed_worker_is_no_traceback(short_script, tmp_path, monkeypatch):
     monkeypatch.setattr(build, "record_takes", vanish)
-    with pytest.raises(FacesynthError, match="goes on where it stopped"):
+    with pytest.raises(FacesynthError, match="what is done is kept"):
         build_performer("small", path=tmp_path / "c", workers=2)
 
 
@@ -177,7 +177,7 @@ def test_calm_speech_is_framed_by_silence(voice):
     assert (calm.pitch_hz[-round(0.3 / 0.005) :] == 0).all()
 
 
-@pytest.mark.parametrize(("options", "message"), [({"script": "large"}, "unknown script"), ({"workers": 0}, "at least 1")])
+@pytest.mark.parametrize(("options", "message"), [({"script": "large"}, "unknown script"), ({"workers": 0}, "1 or more")])
 def test_wrong_arguments_are_refused(options, message):
     with pytest.raises(FacesynthError, match=message):
         build_performer(**options)
