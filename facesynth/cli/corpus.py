@@ -264,9 +264,10 @@ def _header(
 def _words(about: Mapping[str, Any], text: str | None, text_file: Path | None) -> tuple[dict[str, Any], dict[str, str] | None]:
     """What is known of every recording, with the text of the one that is added; and a table of the texts of many."""
     from facesynth.corpus.add.transcripts import read_transcripts
+    from facesynth.stage.listening import read_text
 
     is_table = text_file is not None and text_file.suffix.lower() == ".csv"
-    said = text or (_read_text(text_file) if text_file and not is_table else None)
+    said = text or (" ".join(read_text(text_file).split()) if text_file and not is_table else None)
     known = {name: value for name, value in {**about, "text": said}.items() if value is not None}
     return known, read_transcripts(text_file) if text_file and is_table else None
 
@@ -305,16 +306,6 @@ def _encodings(*given: Path | None) -> tuple[str, ...]:
     from facesynth.encoding import encoding_remark
 
     return tuple(remark for path in given if path is not None for remark in encoding_remark(path))
-
-
-def _read_text(path: Path) -> str:
-    from facesynth.encoding import text_of
-    from facesynth.inference.errors import FacesynthError
-
-    try:
-        return " ".join(text_of(path).split())
-    except (OSError, UnicodeDecodeError) as error:
-        raise FacesynthError(f"{path} cannot be read as text ({error})") from None
 
 
 def _listing(what: str, reasons: Mapping[str, str]) -> list[str]:

@@ -68,15 +68,22 @@ def data_uri(mime: str, content: bytes) -> str:
     return f"data:{mime};base64,{base64.b64encode(content).decode()}"
 
 
+def _panels(count: int, across: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """At most `across` panels of `height` inches in a row; those beyond `count` stay empty."""
+    columns = min(max(count, 1), across)
+    rows = -(-max(count, 1) // columns)
+    figure, axes = new_figure(11, height * rows, rows, columns, **options)
+    for axis in axes.ravel()[count:]:
+        axis.axis("off")
+    return figure, axes
+
+
 def face_figure(details: Mapping[str, Details], face: PointFace, unit: str) -> str:
     """The mean error of every point, as colour on the face; as bars for curves."""
     shown = {label: one.points for label, one in details.items() if one.points.size and np.isfinite(one.points).any()}
     worst = max((float(np.nanmax(points)) for points in shown.values()), default=1.0)
-    columns = min(max(len(shown), 1), 4)
-    rows = -(-max(len(shown), 1) // columns)
-    figure, axes = new_figure(11, 3.4 * rows if not len(face.bars) else 4.6 * rows, rows, columns)
-    for axis in axes.ravel()[len(shown) :]:
-        axis.axis("off")
+    figure, axes = _panels(len(shown), 4, 4.6 if len(face.bars) else 3.4)
+    rows, columns = axes.shape
     drawn = None
     for k, (axis, (label, points)) in enumerate(zip(axes.ravel(), shown.items(), strict=False)):
         bars = len(face.bars) > 0
@@ -115,11 +122,7 @@ def histogram_figure(details: Mapping[str, Details], unit: str, colours: Mapping
     shown = {label: one for label, one in details.items() if one.histogram.size and one.histogram.sum() > 0}
     if not shown:
         return ""
-    columns = min(len(shown), 5)
-    rows = -(-len(shown) // columns)
-    figure, axes = new_figure(11, 2.1 * rows, rows, columns, sharex=True, sharey=True)
-    for axis in axes.ravel()[len(shown) :]:
-        axis.axis("off")
+    figure, axes = _panels(len(shown), 5, 2.1, sharex=True, sharey=True)
     for axis, (label, one) in zip(axes.ravel(), shown.items(), strict=False):
         _histogram(axis, label, one, colours[label])
     for axis in axes[-1]:
@@ -151,11 +154,7 @@ def confusion_figure(matrices: Mapping[str, Confusion]) -> str:
     """Asked (rows) and recognised (columns) emotions of each method, as shares of the asked."""
     if not matrices:
         return ""
-    columns = min(len(matrices), 4)
-    rows = -(-len(matrices) // columns)
-    figure, axes = new_figure(11, 2.7 * rows, rows, columns)
-    for axis in axes.ravel()[len(matrices) :]:
-        axis.axis("off")
+    figure, axes = _panels(len(matrices), 4, 2.7)
     for axis, (label, matrix) in zip(axes.ravel(), matrices.items(), strict=False):
         _confusion(axis, label, matrix)
     return as_uri(figure)

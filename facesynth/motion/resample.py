@@ -11,6 +11,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.filters import ORDER, PASS, falls, reach_of
 from facesynth.inference.long_arrays import let_go, zeros
 from facesynth.inference.motion import Motion
+from facesynth.inference.quaternions import one_hemisphere
 from facesynth.motion.gaps import missing_in
 
 TOGETHER = 8
@@ -115,17 +116,11 @@ def _turns(change: _Change, rotvecs: NDArray[np.float64], missing: NDArray[np.bo
     present = ~missing
     quaternions = np.zeros((len(rotvecs), 4))
     quaternions[present] = Rotation.from_rotvec(rotvecs[present]).as_quat()
-    quaternions[present] = _one_hemisphere(quaternions[present])
+    quaternions[present] = one_hemisphere(quaternions[present])
     whole = Rotation.from_quat(change.slowed(_bridged(quaternions, missing)))
     if len(whole) < 2:
         return np.repeat(whole.as_rotvec(), len(change.at), axis=0)
     return RotationSpline(np.arange(len(whole)), whole)(change.at).as_rotvec()
-
-
-def _one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signs such that successive quaternions are near each other, for q and -q are the same rotation."""
-    steps = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
-    return quaternions * np.cumprod(np.concatenate([[1.0], np.where(steps < 0, -1.0, 1.0)]))[:, None]
 
 
 def _eyes(change: _Change, eyes: NDArray[np.float32] | None) -> NDArray[np.float32] | None:

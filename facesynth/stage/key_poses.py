@@ -14,6 +14,7 @@ from facesynth.face.files.npz import read_npz
 from facesynth.face.solve.fitting import rest_of
 from facesynth.face.solve.key_poses import KeyPoseMap, KeyPoses, worth_posing
 from facesynth.inference.errors import FacesynthError, unknown
+from facesynth.inference.head.keys import table_number
 from facesynth.inference.motion import Motion
 from facesynth.inference.npz import read_all_arrays
 
@@ -120,10 +121,10 @@ def _from_csv(path: Path, corpus: Corpus) -> tuple[tuple[str, ...], NDArray[np.f
         if len(row) != len(header):
             raise FacesynthError(f"{path}, line {line}: {len(row)} cells, but {len(header)} columns")
         cells = dict(zip(header, row, strict=True))
-        at = _number(path, line, clock, cells[clock])
+        at = table_number(path, line, clock, cells[clock])
         motion = corpus[cells[UTTERANCE]].motion
         frames.append(_frame(path, line, motion, at if clock == FRAME else at * motion.fps))
-        weights.append([_number(path, line, name, cells[name]) for name in names])
+        weights.append([table_number(path, line, name, cells[name]) for name in names])
     shape = (len(rows), len(names))
     return names, np.reshape(frames, (len(rows), -1)), np.reshape(np.array(weights, np.float64), shape)
 
@@ -132,13 +133,3 @@ def _frame(path: Path, line: int, motion: Motion, at: float) -> NDArray[np.float
     if not 0 <= round(at) < len(motion):
         raise FacesynthError(f"{path}, line {line}: the recording ends after {len(motion)} frames ({motion.duration_s:.2f} s)")
     return motion.frames[round(at)]
-
-
-def _number(path: Path, line: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise FacesynthError(f"{path}, line {line}: {column} must be a number; got {cell!r}")
-    return value

@@ -58,7 +58,7 @@ def read_head_keys(path: Path, phones: PhoneTrack) -> HeadKeys:
             got = [name.strip() for name in reader.fieldnames or []]
             if lacking := [name for name in COLUMNS if name not in got]:
                 raise FacesynthError(f"{path} lacks {', '.join(lacking)}; key poses are a CSV with columns {','.join(COLUMNS)}")
-            rows = [(reader.line_num, [_number(path, reader.line_num, row, name) for name in COLUMNS]) for row in reader]
+            rows = [(reader.line_num, [_number_in(path, reader.line_num, row, name) for name in COLUMNS]) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FacesynthError(f"{path}: cannot read key poses ({error})") from None
     before = -1.0
@@ -75,11 +75,16 @@ def read_head_keys(path: Path, phones: PhoneTrack) -> HeadKeys:
     return HeadKeys(table[:, 0], np.concatenate([turns, np.zeros((len(table), 3))], axis=1))
 
 
-def _number(path: Path, line: int, row: dict[str, str], name: str) -> float:
+def _number_in(path: Path, line: int, row: dict[str, str], name: str) -> float:
+    return table_number(path, line, name, {key.strip(): cell for key, cell in row.items() if key}.get(name))
+
+
+def table_number(path: Path, line: int, column: str, cell: str | None) -> float:
+    """The finite number in a cell; FacesynthError, with the line, for anything else."""
     try:
-        value = float({key.strip(): cell for key, cell in row.items() if key}[name])
-    except (KeyError, TypeError, ValueError):
+        value = float(cell or "")
+    except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise FacesynthError(f"{path}, line {line}: {name} must be a number; got {row.get(name)!r}")
+        raise FacesynthError(f"{path}, line {line}: {column} must be a number; got {cell!r}")
     return value

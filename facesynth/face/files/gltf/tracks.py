@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf.buffer import Buffer
+from facesynth.inference.quaternions import one_hemisphere
 
 
 class Track(NamedTuple):
@@ -28,9 +29,7 @@ def weights_track(node: int, weights: NDArray[Any]) -> Track:
 
 def rotation_track(node: int, rotations: Rotation) -> Track:
     """[T, 4] x, y, z, w, each on the same side as the one before, so that players take the short way."""
-    quaternions = rotations.as_quat(canonical=True)
-    flips = np.cumprod(np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-    return Track(node, "rotation", (quaternions * np.concatenate([[1.0], flips])[:, None]).astype(np.float32))
+    return Track(node, "rotation", one_hemisphere(rotations.as_quat(canonical=True)).astype(np.float32))
 
 
 def translation_track(node: int, places: ArrayLike) -> Track:
