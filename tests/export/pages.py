@@ -59,7 +59,7 @@ def visited(browser, site, scratch, page="index.html", flags=(), wait_s=WAIT_S):
     server.reported, server.report = threading.Event(), {"error": f"no report within {wait_s} s"}
     threading.Thread(target=server.serve_forever, daemon=True).start()
     command = [browser, "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--user-data-dir={scratch / 'profile'}"]
-    command += ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-background-networking"]
+    command += ["--enable-unsafe-swiftshader", "--no-first-run", "--disable-background-networking"]
     command += ["--proxy-server=127.0.0.1:9", "--proxy-bypass-list=127.0.0.1"]
     command += ["--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1", *flags]
     command += [f"http://127.0.0.1:{server.server_port}/{page}"]

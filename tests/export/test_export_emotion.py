@@ -19,10 +19,11 @@ def test_features_probabilities_and_decisions_are_those_of_torch(pair, speeches)
     for speech in speeches:
         wanted_features, features = (one.features(speech.audio, 16000) for one in (detector, runtime))
         assert np.allclose(features[:187], wanted_features[:187], rtol=1e-6, atol=1e-9)
-        assert np.allclose(features[187:], wanted_features[187:], atol=1e-3)  # the network works in float32
+        # The phone network works in float32, here by onnxruntime and there by torch: 2.8e-4 of values up to 9.8 was measured.
+        assert np.allclose(features[187:], wanted_features[187:], atol=5e-4)
         wanted, got = detector.detect(speech.audio, 16000), runtime.detect(speech.audio, 16000)
         assert got.emotion == wanted.emotion
-        assert got.probabilities == pytest.approx(wanted.probabilities, abs=1e-3)
+        assert got.probabilities == pytest.approx(wanted.probabilities, abs=3e-4)  # measured: 1.1e-4
 
 
 @pytest.mark.parametrize("kernel", ["linear", "polynomial", "radial"])
