@@ -34,8 +34,7 @@ def set_emotion(old: Take, region: int, emotion: str, intensity: float) -> Take:
 
 def move_emotion(old: Take, region: int, end_s: float) -> Take:
     """Let a region end elsewhere."""
-    if not 0 <= region < len(old.emotions) - 1:
-        raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
+    _require_boundary(old, region)
     low = (old.emotions[region - 1].end_s if region else 0.0) + SHORTEST_REGION_S
     high = old.emotions[region + 1].end_s - SHORTEST_REGION_S
     if not low <= end_s <= high:
@@ -57,8 +56,7 @@ def set_curve(old: Take, points: Sequence[Sequence[float]]) -> Take:
 
 def cross_fade(old: Take, region: int, length_s: float) -> Take:
     """Let one emotion fade out and the next fade in around their boundary: the curve falls to 0 there and rises again."""
-    if not 0 <= region < len(old.emotions) - 1:
-        raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(old.emotions)} emotions")
+    _require_boundary(old, region)
     middle = old.emotions[region].end_s
     low, high = max(0.0, middle - length_s / 2), min(old.duration_s, middle + length_s / 2)
     if not low < middle < high:
@@ -73,6 +71,11 @@ def cross_fade(old: Take, region: int, length_s: float) -> Take:
 def _require(take: Take, region: int) -> None:
     if not 0 <= region < len(take.emotions):
         raise FacesynthError(f"there is no emotion {region}; the take has 0 to {len(take.emotions) - 1}")
+
+
+def _require_boundary(take: Take, region: int) -> None:
+    if not 0 <= region < len(take.emotions) - 1:
+        raise FacesynthError(f"there is no boundary after emotion {region}; the take has {len(take.emotions)} emotions")
 
 
 def _share(value: float) -> float:

@@ -16,7 +16,7 @@ from facesynth.stage.performance import OUTPUTS
 from facesynth.stage.request import Request
 from facesynth.studio.document import first_take, take_facts
 from facesynth.studio.jobs import Job, Jobs
-from facesynth.studio.library import Signature, corpus_facts, differing, recorded, signature
+from facesynth.studio.library import Signature, corpus_facts, differing, recorded, set_text, signature
 from facesynth.studio.messages import project_facts
 from facesynth.studio.node_maps import NodeMaps
 from facesynth.studio.performing import Performing, Shown, model_facts
@@ -163,6 +163,12 @@ class Studio:
         self._seen = signature(self.corpus.path, self.model)
         return count
 
+    async def set_text(self, utterance: str, text: str) -> None:
+        """Correct a transcript, which is no news from the disk: every window shows it, and none says that something changed."""
+        set_text(self.corpus, utterance, text)
+        self._seen = signature(self.corpus.path, self.model)
+        await self.reload([])
+
     def train(self, method: str) -> Job:
         """Let the command line learn a model of the corpus, and use it when it is there."""
         path = self.project.folder / "models" / f"{method_class(method).name}.safetensors"
@@ -173,15 +179,16 @@ class Studio:
 
         return self.jobs.start(f"train {method}", ["train", method, str(self.corpus.path), "-o", str(path)], use)
 
-    def evaluate(self, method: str) -> Job:
-        """Let the command line write a report: a method beside the reference rows, on sentences that none of them saw."""
+    def evaluate(self, method: str, folds: int, references: bool) -> Job:
+        """Let the command line write a report: a method, beside the reference rows or alone, on sentences that it did not see."""
         name = method_class(method).name
         folder = self.project.folder / REPORTS / f"{name}-{len(self.reports()) + 1}"
 
         async def tell(_job: Job) -> None:
             await self.tell_all({"kind": "reports", "reports": self.reports()})
 
-        return self.jobs.start(f"evaluate {name}", ["evaluate", str(self.corpus.path), name, "-o", str(folder)], tell)
+        asked = ["--folds", str(folds), *([] if references else ["--no-references"])]
+        return self.jobs.start(f"evaluate {name}", ["evaluate", str(self.corpus.path), name, "-o", str(folder), *asked], tell)
 
     def reports(self) -> list[str]:
         """Names of the project's reports, the oldest first."""
@@ -217,7 +224,7 @@ class Studio:
                 await self.reload(names)
 
     async def reload(self, names: list[str]) -> None:
-        """Read the corpus anew and say why."""
+        """Read the corpus anew and say why; nothing is said where no name is given."""
         try:
             self.corpus = Corpus.open(self.corpus.path)
             await self.tell_all({"kind": "corpus", "changed": names, "corpus": corpus_facts(self.corpus)})

@@ -12,7 +12,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.studio.document import Document
-from facesynth.studio.library import set_text
 from facesynth.studio.map_questions import QUESTIONS
 from facesynth.studio.messages import face_message, parsed
 from facesynth.studio.performing import Performing
@@ -226,10 +225,11 @@ class SocketWindow:
         return {"job": self._studio.train(str(message["method"])).facts()}
 
     async def _op_evaluate(self, message: dict[str, Any]) -> dict[str, Any]:
-        return {"job": self._studio.evaluate(str(message["method"])).facts()}
+        folds, references = int(message["folds"]), message["references"] is True
+        return {"job": self._studio.evaluate(str(message["method"]), folds, references).facts()}
 
     async def _op_text(self, message: dict[str, Any]) -> None:
-        set_text(self._studio.corpus, str(message["utterance"]), str(message["text"]))
+        await self._studio.set_text(str(message["utterance"]), str(message["text"]))
 
 
 _OPS: Mapping[str, Callable[[SocketWindow, dict[str, Any]], Awaitable[dict[str, Any] | None]]] = {

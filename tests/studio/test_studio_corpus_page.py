@@ -107,7 +107,10 @@ def test_models_are_trained_and_judged_from_the_page(chromium, tmp_path):
         job(page, "#corpus-train")
         page.until("facesynth.store.model?.method === 'phone_mean'")
         assert load(tmp_path / "work" / "models" / "phone_mean.safetensors").capabilities.name == "phone_mean"
-        job(page, "#corpus-evaluate", within_s=3600)
+        page.page.fill("#corpus-folds", "2")
+        page.page.uncheck("#corpus-references")
+        judged = job(page, "#corpus-evaluate", within_s=600)
+        assert "--folds 2 --no-references" in judged["command"]
         page.until("facesynth.store.reports.length === 1")
         with page.context.expect_page() as opened:
             page.page.click("#corpus a[href^='/reports/']")

@@ -9,6 +9,8 @@ const page = document.getElementById("corpus");
 const chosen = new Set();
 let problems = null;
 let methods = [];
+/** What an evaluation is asked for, kept when the page is drawn anew. */
+const settings = { "corpus-folds": 5, "corpus-references": true };
 
 export function begin() {
   watch("corpus jobs", show);
@@ -36,7 +38,9 @@ function show() {
       make("button", { id: "corpus-align", textContent: "Place phones anew", title: "Of the utterances that are ticked; phones that were corrected by hand stay", onclick: align }),
       labelled("Method", choice(methods, store.model?.method ?? methods[0], { id: "corpus-method" })),
       make("button", { id: "corpus-train", textContent: "Train", onclick: () => run("train", { method: document.getElementById("corpus-method").value }) }),
-      make("button", { id: "corpus-evaluate", textContent: "Evaluate", title: "Beside reference rows, on sentences that none of them saw", onclick: () => run("evaluate", { method: document.getElementById("corpus-method").value }) })),
+      labelled("Folds", setting("corpus-folds", { type: "number", min: 2, max: 20, title: "So often it is trained and tested, each time on other sentences" })),
+      labelled("Reference rows", setting("corpus-references", { type: "checkbox", title: "Beside the mean face and other methods that everything is measured by; each is trained, too" })),
+      make("button", { id: "corpus-evaluate", textContent: "Evaluate", title: "On sentences that it did not see", onclick: evaluate })),
     ...reportRows(),
     make("div", { id: "corpus-jobs" }, ...jobRows().slice(0, 4)),
     ...problemRows(),
@@ -53,10 +57,21 @@ function reportRows() {
   return [make("p", { className: "row" }, "Reports: ", ...links)];
 }
 
+function setting(id, facts) {
+  const held = facts.type === "checkbox" ? "checked" : "value";
+  const input = make("input", { id, ...facts, [held]: settings[id] });
+  input.addEventListener("input", () => (settings[id] = input[held]));
+  return input;
+}
+
 const minutes = (corpus) => (corpus.utterances.reduce((sum, row) => sum + row.duration_s, 0) / 60).toFixed(1);
 
 function run(op, facts = {}) {
   ask(op, facts).catch((error) => say(error.message, true));
+}
+
+function evaluate() {
+  run("evaluate", { method: document.getElementById("corpus-method").value, folds: Number(settings["corpus-folds"]), references: settings["corpus-references"] });
 }
 
 function align() {

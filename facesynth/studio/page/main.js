@@ -65,7 +65,7 @@ function listen() {
   });
   on("corpus", (message) => {
     store.corpus = message.corpus;
-    say(`changed on disk: ${message.changed.join(", ")}`);
+    if (message.changed.length) say(`changed on disk: ${message.changed.join(", ")}`);
     changed("corpus");
   });
   on("note", ({ lines }) => lines.length && say(lines.join("; "), true));
