@@ -1,6 +1,6 @@
 """Near and lively: searches and the network beside each other on the same clips of one talker, each as lively as the other.
 
-python benchmarks/frontier.py CORPUS -o FOLDER [--fold 1] [--clips 50] [--variant base] [--device cuda] [--join]
+python benchmarks/frontier.py CORPUS -o FOLDER [--fold 1] [--clips 50] [--variant both] [--device cuda] [--join]
 
 Each of five folds tests a fifth of the sentences. Of the others a fifth says how much lips must be sharpened to move as recorded
 (and which variant of `network_variants.py` is taken, of those that FOLDER holds for the fold), by models that learned from the
@@ -104,8 +104,8 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
 def best_variant(folder: Path, fold: int) -> str:
     """Of the variants in a folder the one of least lip error on the clips that a fold chooses by."""
     found = [json.loads(path.read_text()) for path in sorted(folder.glob(f"{fold}_*_0.json"))]
-    found = [each for each in found if not each["variant"].startswith("sound")]
-    return min(found, key=lambda each: each["lve"])["variant"] if found else "base"
+    found = [each for each in found if " ms" not in each["variant"] and each["variant"] != "sound"]
+    return min(found, key=lambda each: each["lve"])["variant"] if found else "both"
 
 
 def shares_of(model: Method, held_out: Corpus) -> tuple[float, float]:
@@ -132,10 +132,11 @@ def lively(motions: Motions, tested: Corpus, share: float, beside: ResidualMotio
 def soft_efase(network: Network, learned: Corpus) -> Efase:
     """eFASE soft as it is before its weights are learned, not sharpened, which expects what the network does."""
     settings = {**load_config(CONFIGS / "efase_soft.yaml"), **AS_IT_COMES, "residual": 0.0, "maps": False}
-    model = Efase.from_config({**settings, "pose_weight": 0.0}).fit(learned)
+    expecting = {name: settings[name] for name in ("pose_weight", "expected_share")}
+    model = Efase.from_config({**settings, **dict.fromkeys(expecting, 0.0)}).fit(learned)
     model.audio.predictor = deepcopy(network.predictor)
     model.audio.predictor.answer_in(model.pca.encode)
-    return model.with_weights(pose_weight=settings["pose_weight"])
+    return model.with_weights(**expecting)
 
 
 def soft_graph(network: Network, learned: Corpus) -> AnimeGraph:

@@ -48,27 +48,25 @@ class Variant:
         return Variant(*({**getattr(self, name), **getattr(other, name)} for name in ("settings", "constants", "shape")))
 
 
-BOTH, PHONE_NET = Variant({"features": "both"}), Variant({"features": "phone_net"})
-LIPS = Variant(constants={"point_loss.LIPS": 12.0})
-NOISY = Variant(constants={"windows.NOISE": 0.3, "windows.LOUDNESS": 0.3, "windows.MASK_SHARE": 0.9})
-TEMPO = Variant(constants={"windows.TEMPO": 0.25})
-DROPPED = Variant({"steps": 1000}, shape={"dropout": 0.35})
-LONGER = Variant({"steps": 1400})
-SETTLED = Variant(constants={"expectation.AVERAGED": 0.995})
+BANDS = Variant({"features": "log_mel"})
+SETTLED = BANDS | Variant(constants={"expectation.AVERAGED": 0.995})
+DROPPED = BANDS | Variant({"steps": 1000}, shape={"dropout": 0.35})
 VARIANTS = {
-    "base": Variant(),
-    "both": BOTH,
-    "phone_net": PHONE_NET,
-    "lips": LIPS,
-    "noisy": NOISY,
-    "tempo": TEMPO,
+    "both": Variant(),
+    "bands": BANDS,
+    "phone_net": Variant({"features": "phone_net"}),
+    "lips": BANDS | Variant(constants={"point_loss.LIPS": 12.0}),
+    "noisy": BANDS | Variant(constants={"windows.NOISE": 0.3, "windows.LOUDNESS": 0.3, "windows.MASK_SHARE": 0.9}),
+    "tempo": BANDS | Variant(constants={"windows.TEMPO": 0.25}),
     "dropped": DROPPED,
-    "longer": LONGER,
+    "longer": BANDS | Variant({"steps": 1400}),
     "settled": SETTLED,
-    "both dropped": BOTH | DROPPED | SETTLED,
+    "dropped, settled": DROPPED | SETTLED,
+    "sound": Variant({"phones": False}),
 }
-VARIANTS |= {"sound": Variant({"phones": False})}
-VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in (0, 40, 80, 160, 320)}
+LOOK_AHEAD_MS = (0, 40, 80, 160, 320)
+VARIANTS |= {f"{ms} ms": Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
+VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
 
 
 def main() -> None:

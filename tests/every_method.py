@@ -3,7 +3,7 @@
 from facesynth.methods.registry import create, list_methods
 
 SETTINGS = {
-    "efase": {"audio_weight": 1.0, "pose_weight": 1.0, "residual": 1.0},
+    "efase": {"audio_weight": 1.0, "pose_weight": 1.0, "expected_share": 0.5, "residual": 1.0},
     "anime_graph": {"pose_weight": 1.0},
     "eyes": {"patch_s": 0.5},
     "lds": {"deterministic_order": 2, "stochastic_order": 2, "lead_ms": 0.0},

@@ -234,7 +234,7 @@ def test_what_is_wrong_is_named(pair, speeches):
 
 
 SOFT = {
-    "soft": {"audio_weight": 0.0, "pose_weight": 0.0, "sharpening": 0.0, "candidates": 20},
+    "soft": {"audio_weight": 0.0, "pose_weight": 0.0, "expected_share": 0.0, "sharpening": 0.0, "candidates": 20},
     "softly heard": {},
     "heard": {"temperature": 0.0, "sharpening": 0.0},
 }
@@ -244,9 +244,9 @@ SOFT = {
 def soft_model(small_corpus):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prediction, "STEPS", 5)  # how well it predicts does not matter here
-        model = Efase(components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, sharpening=0.8).fit(
-            small_corpus
-        )
+        model = Efase(
+            components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, expected_share=0.3, sharpening=0.8
+        ).fit(small_corpus)
     model.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
     return model
 

@@ -147,7 +147,9 @@ def _only_that_changed(draft, before, after):
 def test_a_model_that_hears_and_takes_means_gives_the_same(halves, speech):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prediction, "STEPS", 12)
-        hearing = Efase(audio_weight=0.2, pose_weight=0.5, temperature=0.3, candidates=30, sharpening=0.5).fit(halves[0], seed=1)
+        hearing = Efase(
+            audio_weight=0.2, pose_weight=0.5, temperature=0.3, candidates=30, expected_share=0.4, sharpening=0.5
+        ).fit(halves[0], seed=1)
     rng, constraints, editor = np.random.default_rng(3), {}, hearing.edit()
     for _ in range(7):
         draft = editor.change(speech, constraints=constraints)

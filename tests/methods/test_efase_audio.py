@@ -113,6 +113,25 @@ def test_what_is_heard_survives_saving_and_repeats(hearing, halves, speech, tmp_
     assert load(tmp_path / "deaf.safetensors").plan(speech).expected is None
 
 
+def test_a_share_of_the_pose_is_the_expected_one(hearing, speech):
+    def posed(share):
+        speaker = hearing.with_weights(expected_share=share).speaker
+        plan, labels = speaker.plan(speech), speech.phones.labels
+        feelings, bounds = speech.emotions.per_phone(speech.phones)[0], speech.phones.frame_bounds(speaker.database_fps)
+        return speaker.coordinates(plan, labels, feelings, bounds), plan.expected
+
+    found, expected = posed(0.0)
+    assert np.abs(found - expected).max() > 1
+    np.testing.assert_allclose(posed(0.25)[0], 0.75 * found + 0.25 * expected, atol=1e-9)
+    np.testing.assert_allclose(posed(1.0)[0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("settings", [{"expected_share": 1.1, "pose_weight": 1.0}, {"expected_share": 0.5}])
+def test_a_share_of_what_nobody_expects_is_refused(settings):
+    with pytest.raises(FacesynthError, match="expected_share"):
+        Efase(**settings)
+
+
 def test_a_model_without_ears_cannot_be_made_to_hear(halves):
     with pytest.raises(FacesynthError, match="above 0"):
         Efase().fit(halves[0]).with_weights(pose_weight=1.0)

@@ -39,7 +39,7 @@ def _small_steps():
 
 @pytest.fixture(scope="module")
 def by_sound(halves):
-    return Network(steps=4, phones=False, look_ahead_s=0.08).fit(halves[0], seed=1)
+    return Network(steps=4, features="log_mel", phones=False, look_ahead_s=0.08).fit(halves[0], seed=1)
 
 
 def missed(model, corpus):

@@ -73,13 +73,14 @@ class EfaseDraft:
 
     def _mark(self, plan: Plan, t: int, bounds: Sequence[int]) -> Hashable:
         names, mixture = self.model.names, plan.mixtures[t] if plan.mixtures is not None else None
+        shown = plan.nodes[t] < 0 or self.model.settings.expected_share > 0
+        expected = (
+            None if plan.expected is None or not shown else plan.expected[bounds[t] : bounds[t + 1]].round(SHARES).tobytes()
+        )
         if mixture is not None:
             mixed = tuple(names[node] for node in mixture.nodes.tolist())
-            return (mixed, mixture.shares.round(SHARES).tobytes(), round(mixture.captured, SHARES))
-        if plan.nodes[t] < 0:
-            expected = plan.expected
-            return None if expected is None else expected[bounds[t] : bounds[t + 1]].round(SHARES).tobytes()
-        return names[plan.nodes[t]]
+            return (mixed, mixture.shares.round(SHARES).tobytes(), round(mixture.captured, SHARES), expected)
+        return (names[plan.nodes[t]] if plan.nodes[t] >= 0 else None, expected)
 
 
 class EfaseEditor:

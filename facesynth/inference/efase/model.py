@@ -50,6 +50,8 @@ class Settings:
     """Nodes of each phone that such a mean is taken over."""
     sharpening: float = 0.0
     """How much quick movement is raised."""
+    expected_share: float = 0.0
+    """How much of the pose, before it is sharpened, is the expected one; the search's is the rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,10 +256,16 @@ class Efase:
         return parts.add(np.repeat(made[-1:], max(0, count - len(made)), axis=0)).whole()
 
     def coordinates(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
-        """[T, D] PCA coordinates of a plan, silence at rest in each phone's feeling, not yet sharpened."""
+        """[T, D] PCA coordinates of a plan, silence at rest in each phone's feeling, not yet sharpened.
+
+        Where a pose is expected of each frame, `expected_share` of it: what a mean over recorded movements and a regression
+        miss is not the same, so their mean is nearer than either (docs/frontier.md).
+        """
         rest = self.parts.rest[[self._emotion_index(feeling) for feeling in feelings]]
         fps, smoothing = self.database_fps, self.settings.smoothing
-        return concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
+        found = concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
+        share = 0.0 if plan.expected is None else self.settings.expected_share
+        return found if share == 0 else found + share * (plan.expected - found)
 
     def _decoded(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         coordinates = self.coordinates(plan, labels, feelings, bounds)

@@ -27,6 +27,8 @@ CAPABILITIES = Capabilities(
         "temperature": 1.0,
         "candidates": 60,
         "pose_weight": 1.0,
+        "features": "both",
+        "expected_share": 0.5,
         "sharpening": 1.0,
         "residual": 1.0,
         "learn": True,

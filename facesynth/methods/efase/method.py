@@ -58,7 +58,8 @@ class Efase(Method):
     `temperature` 0 is the paper: the cheapest path. Above 0 (in median rule-2 transitions, like `penalty`) every
     path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
     (see `soft`): nearer to the truth on average, with less motion. `audio_weight` and `pose_weight` let the sound
-    speak in the target cost (see `audio`), `sharpening` raises quick movement (see `sharpening`), `residual` is how much is
+    speak in the target cost (see `audio`), `expected_share` is how much of the pose that is shown is the expected one in place
+    of the search's (0..1), `sharpening` raises quick movement (see `sharpening`), `residual` is how much is
     added of what recorded faces do beside their lips (see `inference.residual`); 0 in the paper.
 
     With `learn`, training starts from these weights and learns all that are above 0 on sentences of the corpus that it
@@ -100,6 +101,7 @@ class Efase(Method):
         candidates: int = 150,
         audio_weight: float = 0.0,
         pose_weight: float = 0.0,
+        expected_share: float = 0.0,
         sharpening: float = 0.0,
         residual: float = 0.0,
         learn: bool = False,
@@ -113,6 +115,11 @@ class Efase(Method):
             raise FacesynthError(
                 "temperature, audio_weight, pose_weight, sharpening and residual must be at least 0, candidates at least 1; "
                 f"got {lowest:g} and {candidates}"
+            )
+        if not 0 <= expected_share <= 1 or (expected_share > 0 and pose_weight == 0):
+            raise FacesynthError(
+                "expected_share is a share of the pose, 0 to 1, and wants a pose_weight above 0, with which a pose is expected; "
+                f"got {expected_share:g} and a pose_weight of {pose_weight:g}"
             )
         self.pca = Pca(torch.zeros(0), torch.zeros(0, 0), torch.zeros(0))
         self.audio = AudioTerms(audio=audio_weight > 0, pose=pose_weight > 0, features=features, voices=voices)
@@ -237,6 +244,7 @@ class Efase(Method):
             temperature=self.temperature,
             candidates=config["candidates"],
             sharpening=config["sharpening"],
+            expected_share=config["expected_share"],
         )
 
     def asked(

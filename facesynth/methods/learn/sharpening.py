@@ -28,8 +28,10 @@ def _speed_ratios(made: Motion, truth: Motion, points: Sequence[int] | None) -> 
     mine, theirs = (_some(motion, count, points) for motion in (made, truth))
     recorded = _speeds(without_roughness(theirs, fps), truth)
     present = np.isfinite(recorded)
-    sharp = [sharpen(mine, share, fps) for share in SHARES]
-    made_speeds = [_speeds(without_roughness(frames, fps), made)[present].mean() for frames in sharp]
+    plain = without_roughness(mine, fps)
+    none = without_roughness(plain, fps)
+    raised = without_roughness(sharpen(mine, 1.0, fps), fps) - none  # what is raised goes with the share
+    made_speeds = [_speeds(none + share * raised if share else plain, made)[present].mean() for share in SHARES]
     return np.array(made_speeds) / max(recorded[present].mean(), 1e-12)
 
 

@@ -52,7 +52,7 @@ class Network(Method):
         steps: int = STEPS,
         phones: bool = True,
         look_ahead_s: float = -1.0,
-        features: Features = "log_mel",
+        features: Features = "both",
         voices: int = 0,
         unsaid: float = 0.0,
         sharpening: float = 0.0,
