@@ -20,9 +20,17 @@ from facesynth.cli.types import FILE
     show_default=True,
     help="In what large constants are kept; fewer bits are smaller and less exact.",
 )
+@click.option(
+    "--beside",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="File of a model of phones alone: what it says is averaged with what MODEL, a network that hears, says.",
+)
+@click.option("--share", type=float, default=0.5, show_default=True, help="How much of the mean --beside counts, 0 to 1.")
 @click.option("--json", "as_json", is_flag=True, help="Print the manifest.")
 @click.pass_obj
-def export(only: str | None, /, model: Path, output: Path, weights: str, as_json: bool) -> None:
+def export(
+    only: str | None, /, model: Path, output: Path, weights: str, beside: Path | None, share: float, as_json: bool
+) -> None:
     """Write MODEL as a folder that runs without torch: ONNX graphs, arrays and a manifest.
 
     The words `features`, `phones` and `face` in place of a model's file write what is heard in sound, the network that hears
@@ -39,7 +47,7 @@ def export(only: str | None, /, model: Path, output: Path, weights: str, as_json
     if only in (None, str(model)) and str(model) in parts:
         manifest = parts[str(model)](output, kept)
     else:
-        manifest = export_model(model, output, kept, only=only)
+        manifest = export_model(model, output, kept, only=only, beside=None if beside is None else (beside, share))
     if "unknown" in (*manifest["training_data"]["licences"], *manifest["training_data"]["consents"]):
         click.echo(f"warning: {model} does not state under which licences and consents it was trained", err=True)
     if as_json:

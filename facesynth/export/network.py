@@ -1,5 +1,7 @@
 """The network of poses as graphs: sound to bands, and what is told of them to frames."""
 
+from dataclasses import asdict
+
 from facesynth.export.expectation import expectation_graph, hearing_graphs, predictor_arrays, predictor_settings, residual_arrays
 from facesynth.export.folder import Content
 from facesynth.methods.network.method import Network
@@ -17,6 +19,7 @@ def network_content(model: Network) -> Content:
             "sharpening": model.config["sharpening"],
             "residual": model.config["residual"] if model.residual and model.residual.any else 0.0,
             "closed_gap": model.facts["closed_gap"] if model.config["close_lips"] else None,
+            "openings": asdict(model.openings) if model.openings else None,
         },
         latency={
             "look_ahead_s": speaker.look_ahead_s,

@@ -64,7 +64,7 @@ def keep_shut(changed: Floats, before: Floats, layout: Layout) -> Floats:
     points, old = layout.points(changed.copy()), layout.points(before)
     shut = _shut(pair_gaps(before, layout))[..., None]
     apart = (points[:, upper] - points[:, lower]) - (old[:, upper] - old[:, lower])
-    _bring_together(points, layout, shut * apart / 2)
+    bring_together(points, layout, shut * apart / 2)
     return points.reshape(changed.shape)
 
 
@@ -88,7 +88,7 @@ def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: flo
         correction = np.zeros((len(near), pairs, layout.dimension))
         correction[..., 1] = (amount * (heights.min() - nearest))[:, None] / 2
         some = points[near]
-        _bring_together(some, layout, correction)
+        bring_together(some, layout, correction)
         points[near] = some
         let_go(out)
     return out
@@ -142,7 +142,7 @@ class ClosingLips:
         return final
 
 
-def _bring_together(points: Floats, layout: Layout, correction: Floats) -> None:
+def bring_together(points: Floats, layout: Layout, correction: Floats) -> None:
     """Move upper lip points [T, K, dimension] by minus and lower ones by plus the correction [T, pairs, dimension]."""
     upper, lower = np.array(layout.lip_pairs).T
     for group, own, sign in (("upper_lip", upper, -1), ("lower_lip", lower, 1)):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .beside import Beside, exported_beside
 from .checks import checked_piece, checked_rate, require_open
 from .closures import close_at
 from .errors import FacesynthError, reject_options, unknown
@@ -18,6 +19,7 @@ from .layout import Layout
 from .lips import bilabial_spans
 from .long_arrays import by_blocks
 from .motion import Motion
+from .openings import Openings
 from .residual import ResidualMotion, exported_residual, main_emotion
 from .sound import resample
 from .speech import NEUTRAL, Speech
@@ -40,6 +42,10 @@ class Network:
     sharpening: float = 0.0
     closed_gap: float = np.inf
     """How near the lips come at a p, b or m; infinite where they are left as they are."""
+    openings: Openings | None = None
+    """How far lips are open between shut and wide, where that is not left as it is."""
+    beside: Beside | None = None
+    """A model of phones alone, whose motion is averaged with the network's."""
     residual: ResidualMotion | None = None
     """What moves beside the lips, whatever is said."""
     unsaid: bool = False
@@ -58,12 +64,18 @@ class Network:
         return later_s + self.hear.look_ahead_s(ahead_s) + HOP / RATE
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
-        """What is expected, sharpened, lips closed at p, b and m, and what moves beside the lips. Nothing is random."""
+        """What is expected, sharpened, averaged with what phones alone say, openings evened out, lips closed at p, b and m, and
+        what moves beside the lips. Nothing is random.
+        """
         reject_options("network", options, ("seed",))
         sound = resample(speech.audio, speech.sample_rate, RATE)
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         frames = self.expectation.poses(self.hear(sound), Said.of(speech, self.emotions), self.fps, count)
         frames = sharpen(frames, self.sharpening, self.fps)
+        if self.beside is not None:
+            frames = self.beside.mixed(frames, speech)
+        if self.openings is not None:
+            frames = self.openings.even_out(frames, self.layout)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         if self.residual is not None:
             frames = self.residual.added(frames, speech, main_emotion(speech, self.emotions), self.fps)
@@ -74,7 +86,8 @@ class Network:
 
         `ahead_s` is how far the windows of the phone network reach ahead, for a model that hears with it: what comes out
         depends on it a little, as it does on how loud the sound was so far. FacesynthError for a model that cannot do without
-        being told phones, which a stream does not know. A stream is not sharpened, closes no lips, and adds no residual motion.
+        being told phones, which a stream does not know. A stream is not sharpened, closes no lips, evens no openings, and adds
+        neither what phones alone say nor residual motion.
         """
         if self.expectation.reading.phones and not self.unsaid:
             raise FacesynthError(
@@ -161,7 +174,7 @@ class SoundStream:
 def load_network(folder: Folder, threads: int) -> Network:
     """The model in a folder that `network_content` filled."""
     manifest, settings, arrays = folder.manifest, folder.settings, folder.arrays()
-    gap = settings["closed_gap"]
+    gap, openings = settings["closed_gap"], settings.get("openings")
     return Network(
         folder.layout,
         float(manifest["fps"]),
@@ -170,6 +183,8 @@ def load_network(folder: Folder, threads: int) -> Network:
         exported_expectation(folder, arrays, threads),
         sharpening=float(settings["sharpening"]),
         closed_gap=np.inf if gap is None else float(gap),
+        openings=None if openings is None else Openings(**openings),
+        beside=exported_beside(folder, arrays, threads),
         residual=exported_residual(folder, arrays),
         unsaid=bool(settings.get("unsaid")),
         manifest=manifest,

@@ -8,7 +8,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.filters import ORDER, PASS, falls, reach_of
+from facesynth.inference.filters import ORDER, PASS, butterworth, falls, forth_and_back, reach_of
 from facesynth.inference.long_arrays import let_go, zeros
 from facesynth.inference.motion import Motion
 from facesynth.inference.quaternions import one_hemisphere
@@ -16,6 +16,8 @@ from facesynth.motion.gaps import missing_in
 
 TOGETHER = 8
 """Points that are brought to another rate at once: those of a long recording together would take ten times its memory."""
+SENTENCE_FRAMES = 1000
+"""Up to so many frames are filtered without scipy."""
 
 
 def resample(motion: Motion, fps: float) -> Motion:
@@ -59,14 +61,17 @@ class _Change:
         """Without what the new rate cannot carry; nothing is taken out where the rate hardly falls.
 
         The same filter as `facesynth.inference.filters.at_rate` and, in `apply`, the same spline, by scipy: recordings are long,
-        and it takes a ninth of the time for 50 s of 90 markers and less than a hundredth for ten minutes of a head.
+        and it takes a ninth of the time for 50 s of 90 markers and less than a hundredth for ten minutes of a head. For a
+        sentence importing scipy's filters takes longer than ours.
         """
         if len(signal) < 2 or not falls(self.fps, self.new_fps):
             return signal
+        cutoff, reach = PASS * self.new_fps / self.fps, reach_of(len(signal), self.fps, self.new_fps)
+        if len(signal) <= SENTENCE_FRAMES:
+            return forth_and_back(butterworth(ORDER, cutoff), signal, reach)
         from scipy.signal import butter, sosfiltfilt  # takes 0.3 s to import
 
-        lowpass = butter(ORDER, PASS * self.new_fps / self.fps, output="sos")
-        return sosfiltfilt(lowpass, signal, axis=0, padlen=reach_of(len(signal), self.fps, self.new_fps))
+        return sosfiltfilt(butter(ORDER, cutoff, output="sos"), signal, axis=0, padlen=reach)
 
     def touches(self, missing: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """[T, n] which old samples are missing → [T', n] which new ones are."""

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -39,6 +41,22 @@ def test_frames_that_were_not_recorded_teach_nothing():
     broken = recording(-9 * weights, 0, present=0.0)
     two.learn([*some, broken], READING, 3)
     assert torch.equal(one.weight, two.weight)
+
+
+def test_the_penalty_is_chosen_by_voices_that_were_not_met():
+    """A band that tells all of it in the talker's own sound, and nothing in changed ones, is drawn to nothing by the penalty."""
+
+    def heard_otherwise(changed):
+        weights = np.ones((BANDS, 1), np.float32)
+        weights[1:] = 0.0
+        some = [recording(weights, 0) for _ in range(10)]
+        others = [np.float16(one.bands * [-1, 1, 1, 1]) for one in some]
+        given = [replace(one, others=(other,) * changed) for one, other in zip(some, others, strict=True)]
+        path = LinearPath()
+        path.learn(given, READING, 3)
+        return float(path.weight.float().abs().sum())
+
+    assert heard_otherwise(1) < 0.1 * heard_otherwise(0)
 
 
 def test_it_says_nothing_before_it_has_learned():

@@ -10,7 +10,9 @@ from facesynth.export.models import export_model
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.expectation import EACH, rate_of
 from facesynth.inference.filters import cubic_at
+from facesynth.inference.lips import lip_gap
 from facesynth.inference.loading import load as load_folder
+from facesynth.inference.openings import Openings
 from facesynth.inference.sound import resample
 from facesynth.methods.learn import windows
 from facesynth.methods.learn.expectation import PosePredictor
@@ -201,6 +203,48 @@ def test_told_of_both_the_regression_hears_the_phone_network_and_the_network_doe
     export_model(tmp_path / "both.safetensors", tmp_path / "folder")
     exported = load_folder(tmp_path / "folder").synthesize(speech).frames
     np.testing.assert_allclose(exported, wanted, atol=2e-3 * np.abs(wanted).max())
+
+
+def test_phones_alone_stand_beside_the_network_in_its_folder_and_count_their_share(halves, tmp_path):
+    few, speech = halves[0].subset(halves[0].ids[:6]), halves[1][halves[1].ids[0]].speech
+    made = {"network": Network(steps=2).fit(few), "coarticulation": create("coarticulation").fit(few)}
+    for name, model in made.items():
+        model.save(tmp_path / name)
+    heard, said = (model.synthesize(speech).frames for model in made.values())
+    for share in (0.0, 0.25, 1.0):
+        export_model(tmp_path / "network", tmp_path / "folder", beside=(tmp_path / "coarticulation", share))
+        mean = load_folder(tmp_path / "folder").synthesize(speech).frames
+        np.testing.assert_allclose(mean, heard + share * (said - heard), atol=1e-4 * np.abs(heard).max())
+
+
+def test_what_cannot_stand_beside_a_network_is_told(halves, tmp_path):
+    few = halves[0].subset(halves[0].ids[:4])
+    Network(steps=1).fit(few).save(tmp_path / "network")
+    create("mean_face").fit(few).save(tmp_path / "mean")
+    other = tiny_corpus(tmp_path / "other", utterances=4, fps=25)
+    create("coarticulation").fit(other).save(tmp_path / "slower")
+    with pytest.raises(FacesynthError, match="got mean_face beside network, wanted coarticulation"):
+        export_model(tmp_path / "network", tmp_path / "folder", beside=(tmp_path / "mean", 0.5))
+    with pytest.raises(FacesynthError, match="at another rate"):
+        export_model(tmp_path / "network", tmp_path / "folder", beside=(tmp_path / "slower", 0.5))
+    with pytest.raises(FacesynthError, match="wanted 0 to 1"):
+        export_model(tmp_path / "network", tmp_path / "folder", beside=(tmp_path / "slower", 1.5))
+    assert not (tmp_path / "folder").exists()
+
+
+def test_small_openings_become_wider_where_that_is_asked_and_a_folder_does_it_as_well(halves, tmp_path):
+    few, speech = halves[0].subset(halves[0].ids[:6]), halves[1][halves[1].ids[0]].speech
+    plain, evened = (Network(steps=2, opening_power=power).fit(few) for power in (1.0, 0.5))
+    before, after = (model.synthesize(speech) for model in (plain, evened))
+    rule = Openings(0.5, evened.facts["closed_gap"], evened.facts["wide_gap"])
+    np.testing.assert_allclose(lip_gap(after), rule.changed(lip_gap(before)), atol=1e-3)
+    assert plain.speaker().openings is None
+    evened.save(tmp_path / "evened")
+    export_model(tmp_path / "evened", tmp_path / "folder")
+    again = load_folder(tmp_path / "folder").synthesize(speech).frames
+    np.testing.assert_allclose(again, after.frames, atol=1e-3 * np.abs(after.frames).max())
+    with pytest.raises(FacesynthError, match="opening_power is 0"):
+        Network(opening_power=0)
 
 
 def test_lips_count_four_times_and_missing_frames_not_at_all():

@@ -96,3 +96,10 @@ def test_nothing_and_nonsense_are_refused():
         resample(curve(np.zeros(4), 30), 0)
     with pytest.raises(FacesynthError, match="frames"):
         resample(curve(np.zeros(0), 30), 60)
+
+
+def test_a_sentence_is_filtered_as_a_long_recording_is(monkeypatch):
+    motion = curve(np.random.default_rng(4).normal(size=300), 120)
+    without_scipy = resample(motion, 30).frames
+    monkeypatch.setattr("facesynth.motion.resample.SENTENCE_FRAMES", 0)
+    np.testing.assert_allclose(resample(motion, 30).frames, without_scipy, atol=1e-6)

@@ -97,10 +97,15 @@ def hold_keys(shapes: Floats, keys: Floats, phones: PhoneTrack, fps: float) -> F
 
 def load_coarticulation(folder: Folder, threads: int) -> Coarticulation:
     """The model in a folder that `coarticulation_content` filled."""
-    manifest, arrays = folder.manifest, folder.arrays()
+    return coarticulation_of(folder, folder.arrays(), folder.settings["closed_gap"], threads)
+
+
+def coarticulation_of(folder: Folder, arrays: Mapping[str, NDArray[Any]], gap: float | None, threads: int) -> Coarticulation:
+    """The same of arrays by the names of `KeyShapes` and `WeightModels`, with the folder's graph `decode`."""
+    manifest = folder.manifest
     if manifest["phones"] != [[phone, viseme_of(phone)] for phone in PHONES]:
         raise FacesynthError(f"{folder.path} knows other phones than this runtime; export the model again")
-    decode, gap = Graph(folder, "decode", threads), folder.settings["closed_gap"]
+    decode = Graph(folder, "decode", threads)
     return Coarticulation(
         Parts(
             layout=folder.layout,

@@ -115,7 +115,7 @@ class PosePredictor(nn.Module):
         inputs = len(columns) or self.reading.width
         self.network = PoseNetwork(inputs, self.pca.basis.shape[1], seed=seed, columns=columns).to(device)
         recordings = [self.recording(*one, corpus.emotions) for one in zip(corpus, heard, strict=True)]
-        if len(columns):
+        if self.hearing.features != "log_mel":
             self.linear.learn(recordings, self.reading, self.ahead)
         return Windows(recordings, self.reading, self.ahead, self.unsaid, BANDS if len(columns) else None)
 

@@ -1,13 +1,15 @@
 """Linear regression from the sound around a frame to its pose, beside the network of poses.
 
-They err in different places: the network is one of many that training might have ended in, least squares have one solution. Their
-weighted mean is nearer than either (docs/frontier.md).
+They err in different places, before strangers' voices too: the network is one of many that training might have ended in, least
+squares have one solution. Their weighted mean is nearer than either (docs/frontier.md).
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -53,25 +55,33 @@ class LinearPath(nn.Module):
         return found
 
     def learn(self, recordings: Sequence[Recording], reading: Reading, ahead: int) -> None:
-        """Least squares over all frames that were recorded; the penalty predicts a fifth of the recordings best."""
+        """Least squares over all frames that were recorded; the penalty predicts a fifth of the recordings best.
+
+        Where there are changed sounds, that fifth is heard in these: voices that least squares have not met, as a stranger's is.
+        """
         bands = len(reading.standard.mean)
         offsets = np.arange(-SIDE, min(SIDE, ahead) + 1)
-        parts = [Moments.zero(len(offsets) * bands, recordings[0].poses.shape[1]) for _ in range(2)]
+        learned, choosing, changed = (Moments.zero(len(offsets) * bands, recordings[0].poses.shape[1]) for _ in range(3))
         for number, recording in enumerate(recordings):
-            heard, poses = _samples(recording, reading, offsets)
-            parts[number % CHOOSING == 0 and len(recordings) > 1].add(heard, poses)
-        errors = [parts[1].error(*solution) for solution in parts[0].solutions(PENALTIES)] if parts[1].count else [0.0]
-        weights, bias = (parts[0] + parts[1]).solution(PENALTIES[int(np.argmin(errors))])
+            chooses = number % CHOOSING == 0 and len(recordings) > 1
+            (choosing if chooses else learned).add(*_samples(recording, recording.bands, reading, offsets))
+            for other in recording.others * chooses:
+                changed.add(*_samples(recording, other, reading, offsets))
+        judge = changed if changed.count else choosing
+        errors = [judge.error(*solution) for solution in learned.solutions(PENALTIES)] if judge.count else [0.0]
+        weights, bias = (learned + choosing).solution(PENALTIES[int(np.argmin(errors))])
         shaped = weights.reshape(len(offsets), bands, -1).transpose(2, 1, 0)
         self.weight = torch.from_numpy(np.ascontiguousarray(shaped)).to(self.weight)
         self.bias = torch.from_numpy(bias).to(self.bias)
 
 
-def _samples(recording: Recording, reading: Reading, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sound around each recorded frame [n, K B], and its components [n, R]."""
+def _samples(
+    recording: Recording, bands: NDArray[Any], reading: Reading, offsets: NDArray[np.int64]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Sound [F, B] around each recorded frame [n, K B], and its components [n, R]."""
     times_s = np.arange(len(recording.poses)) / recording.fps
     around = (np.arange(EACH) - (EACH - 1) / 2) / (EACH * reading.rate)
     at = times_s[:, None, None] + (offsets / reading.rate)[:, None] + around
-    heard = reading.standard.at(recording.bands, at).mean(axis=2)  # [T, K, B]
+    heard = reading.standard.at(bands, at).mean(axis=2)  # [T, K, B]
     present = recording.present > 0
     return heard.reshape(len(heard), -1)[present], recording.poses[present]
