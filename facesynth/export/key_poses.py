@@ -9,18 +9,15 @@ from numpy.typing import NDArray
 
 from facesynth.export.folder import Content, Subject, write_folder
 from facesynth.export.graph import Arrays, Graph, Port
-from facesynth.export.weights import Weights, stored_as
 from facesynth.face.solve.key_poses import KeyPoseMap
 from facesynth.graph_builder import TYPES, Builder
 
 
-def export_key_poses(
-    folder: str | Path, found: KeyPoseMap, training_data: dict[str, Any], weights: Weights = "float32"
-) -> dict[str, Any]:
+def export_key_poses(folder: str | Path, found: KeyPoseMap, training_data: dict[str, Any]) -> dict[str, Any]:
     """Write the folder of one graph; training_data: what the performer's corpus states of itself (`Corpus.provenance`)."""
     latency = {"look_ahead_s": 0.0, "about": "frame by frame"}
     content = Content((key_pose_graph(found),), {"channels": list(found.names)}, latency)
-    return write_folder(folder, Subject("graphs", training_data, found.layout.to_dict(), None, ()), stored_as(content, weights))
+    return write_folder(folder, Subject("graphs", training_data, found.layout.to_dict(), None, ()), content)
 
 
 # As in `KeyPoseMap`, with |z - z_k|² = |z|² - 2 z z_k + |z_k|².

@@ -52,11 +52,11 @@ def apply_head(
     return moved.astype(np.float32)
 
 
-def fill_head(head: NDArray[np.float32], fps: float, longest_s: float = LONGEST_S) -> NDArray[np.float32]:
+def fill_head(head: NDArray[np.float32], fps: float) -> NDArray[np.float32]:
     """Fill short gaps of poses [T, 6]: rotations on the great arc, translations by cubic splines."""
     missing = missing_in(head)
     known = np.flatnonzero(~missing)
-    inner = [g for g in runs(missing) if g.start > 0 and g.stop < len(head) and len(g) <= longest_s * fps + 1e-6]
+    inner = [g for g in runs(missing) if g.start > 0 and g.stop < len(head) and len(g) <= LONGEST_S * fps + 1e-6]
     filled = np.where(missing[:, None], np.float32(np.nan), head)
     if inner:
         wanted = np.concatenate([np.arange(gap.start, gap.stop) for gap in inner])

@@ -47,10 +47,9 @@ class BoundedSteps(Steps, Protocol):
 class GivenSteps:
     """All costs in memory: for few candidates, or costs that are used again and again, as in learning."""
 
-    def __init__(self, costs: Sequence[Tensor], links: Sequence[Tensor] | None = None) -> None:
-        """costs: T - 1 of [B, m next, n previous], or without B; links: T - 1 of [B, m], see `Steps.captured`."""
+    def __init__(self, costs: Sequence[Tensor]) -> None:
+        """costs: T - 1 of [B, m next, n previous], or without B."""
         self.costs = [cost if cost.ndim == 3 else cost[None] for cost in costs]
-        self._links = links
 
     def rows(self, t: int, most: int) -> Sequence[Tensor]:
         """See `Steps`."""
@@ -62,10 +61,8 @@ class GivenSteps:
         return self.costs[t][:, rows][:, :, columns].double()
 
     def captured(self, t: int) -> Tensor:
-        """See `Steps`."""
-        if self._links is None:
-            return torch.full_like(self.costs[t][:, :, 0], -1, dtype=torch.int64)
-        return self._links[t]
+        """See `Steps`; nothing is known to have been recorded in a row."""
+        return torch.full_like(self.costs[t][:, :, 0], -1, dtype=torch.int64)
 
 
 def block_size(device: torch.device) -> int:
