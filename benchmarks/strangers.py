@@ -13,10 +13,12 @@ starts. Networks are kept in FOLDER and not learned again. `--device` says where
 """
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import process_time
 from typing import Any
 from unittest.mock import patch
 
@@ -44,6 +46,11 @@ from facesynth.speech.hearing import hear
 FOLD = 1
 VOICES = {"phone_net": 8}
 """Changed sounds that the network learns from as well, by features; none where nothing is said."""
+SEARCHES: dict[str, tuple[Callable[[Network, Corpus], Any], Callable[[Any], tuple[Any, Any]]]] = {
+    "eFASE soft": (soft_efase, lambda model: (model.audio, model.pca.encode)),
+    "anime graph soft": (soft_graph, lambda model: (model, model.in_metric)),
+}
+"""How each is made, and where it keeps the network and in which coordinates it asks it."""
 PLAIN = ("viseme_table", "coarticulation", "efase", "anime_graph", "lds")
 HEADS = (
     "own lip error",
@@ -65,6 +72,7 @@ class Learner:
     learned: Corpus
     kept: Path
     device: str
+    searches: dict[str, Method] = field(default_factory=dict)
 
     def method(self, name: str, settings: Mapping[str, Any]) -> Method:
         """As it is shipped."""
@@ -75,9 +83,17 @@ class Learner:
         variant = Variant({"features": features, "voices": VOICES.get(features, 0)})
         return kept(self.kept / f"network, {features}.safetensors", self.learned, variant, 0, self.device)
 
-    def soft(self, search: Callable[[Network, Corpus], Method], features: str) -> Method:
-        """A search that expects what that network does."""
-        return search(deepcopy(self.network(features)), self.learned)
+    def soft(self, name: str, features: str) -> Method:
+        """A search that expects what that network does; its nodes are the same whatever is heard, and learned once."""
+        search, place = SEARCHES[name]
+        network = deepcopy(self.network(features))
+        if name not in self.searches:
+            self.searches[name] = search(network, self.learned)
+        model = deepcopy(self.searches[name])
+        holder, encode = place(model)
+        holder.predictor = network.predictor
+        holder.predictor.answer_in(encode)
+        return model
 
 
 @dataclass(frozen=True)
@@ -96,8 +112,8 @@ def rows(learner: Learner) -> dict[str, Callable[[], Method]]:
         for name in ("ridge", "tcn"):
             made[f"{name}, {features}"] = lambda name=name, features=features: learner.method(name, {"features": features})
         made[f"network, {features}"] = lambda features=features: learner.network(features)
-        for name, search in (("eFASE soft", soft_efase), ("anime graph soft", soft_graph)):
-            made[f"{name}, {features}"] = lambda search=search, features=features: learner.soft(search, features)
+        for name in SEARCHES:
+            made[f"{name}, {features}"] = lambda name=name, features=features: learner.soft(name, features)
     return made
 
 
@@ -123,10 +139,12 @@ def main() -> None:
     print(f"| | {' | '.join(HEADS)} |\n|---" + len(HEADS) * "|---:" + "|", flush=True)
     with patch.object(Hearing, "of_sound", of_sound):
         for name in options.rows or makers:
+            began = process_time()
             model = makers[name]()
             error = np.nanmean([lip_error(model, u) for u in own])
             figures = (*followed(model, said, heard), *shuts(model, voices, shut))
             print(f"| {name} | {error:.3f} | {' | '.join(f'{figure:.3f}' for figure in figures)} |", flush=True)
+            print(f"{name}: {process_time() - began:.0f} s of processor time", file=sys.stderr, flush=True)
 
 
 def voices_of(recordings: Path, count: int) -> list[Heard]:

@@ -5,9 +5,9 @@ import pytest
 from corpora import tiny_corpus
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.methods.baselines.ridge import Ridge
+from facesynth.methods.baselines.ridge import NARROW, TIMES, WIDE_TIMES, Ridge
 from facesynth.methods.baselines.tcn import Tcn
-from facesynth.methods.learn.hearing import HIDDEN_LAYER, WIDTHS, Hearing
+from facesynth.methods.learn.hearing import BANDS, HIDDEN_LAYER, WIDTHS, Hearing
 from facesynth.speech.phone_archive import is_installed
 
 needs_weights = pytest.mark.skipif(not is_installed(), reason="the weights that phones are heard with are not installed")
@@ -57,6 +57,18 @@ def test_a_model_hears_with_the_layer_that_it_learned_with(corpus, tmp_path):
     model.save(tmp_path / "other.safetensors")
     other = Ridge.load(tmp_path / "other.safetensors")
     assert not np.array_equal(other.hearing.bands(speech), Ridge.load(tmp_path / "m.safetensors").hearing.bands(speech))
+
+
+@needs_weights
+def test_wide_features_are_heard_by_their_principal_components_and_narrow_ones_as_they_are(corpus, tmp_path):
+    wide, bands = Ridge().fit(corpus, seed=0), Ridge(features="log_mel").fit(corpus, seed=0)
+    assert (len(wide.weights), len(bands.weights)) == (WIDE_TIMES * NARROW, TIMES * BANDS)
+    speech = next(iter(corpus)).speech
+    wide.save(tmp_path / "m.safetensors")
+    assert np.array_equal(Ridge.load(tmp_path / "m.safetensors").synthesize(speech).frames, wide.synthesize(speech).frames)
+    wide.narrow, wide.weights = bands.narrow, wide.weights.new_zeros(TIMES * WIDTHS["both"], wide.weights.shape[1])
+    as_before = wide.synthesize(speech).frames
+    np.testing.assert_allclose(as_before, np.broadcast_to(as_before[0], as_before.shape), rtol=1e-5)
 
 
 def test_unknown_features_are_refused():

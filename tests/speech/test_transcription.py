@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import facesynth
 from facesynth.cli.speak import speak
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech import transcription
+from facesynth.speech.audio import save_wav
 from facesynth.speech.phone_archive import is_installed
 from facesynth.speech.phone_sources import find_phones
 from facesynth.speech.transcription import Transcript, transcribe
+from facesynth.stage.request import Part
+from facesynth.zoo.shelf import DEFAULT
 
 FOX = "The quick brown fox jumps over the lazy dog."
 needs_network = pytest.mark.skipif(not is_installed(), reason="the weights that phones are heard with are not installed")
@@ -67,6 +71,21 @@ def test_what_does_not_fit_the_sound_is_refused_and_the_phones_are_heard(say, wr
     found = find_phones(audio, rate, transcriber=writes(text, language))
     assert (found.source, found.text) == ("recognition", "")
     assert reason in found.remarks[0]
+
+
+@needs_network
+def test_what_was_transcribed_is_written_out_and_a_corrected_text_stays(say, writes, tmp_path):
+    save_wav(tmp_path / "a.wav", *say(FOX))
+    asked = {"transcriber": writes(FOX, "en"), "head": Part("off"), "eyes": Part("off")}
+    spoken = facesynth.speak(DEFAULT, tmp_path / "a.wav", tmp_path / "out.npz", **asked)
+    assert {path.name for path in spoken.written} == {"out.npz", "out.TextGrid", "out.txt"}
+    assert (tmp_path / "out.txt").read_text(encoding="utf-8") == FOX
+    assert any("transcribed, en" in remark for remark in spoken.remarks)
+    (tmp_path / "out.txt").write_text("The quick brown fox jumped over the lazy dog.", encoding="utf-8")
+    again = facesynth.speak(DEFAULT, tmp_path / "a.wav", tmp_path / "out.npz", **asked)
+    assert tmp_path / "out.txt" not in again.written
+    assert "jumped" in (tmp_path / "out.txt").read_text(encoding="utf-8")
+    assert any("out.txt was there and differs" in remark for remark in again.remarks)
 
 
 def test_words_that_are_given_are_not_transcribed(say, tmp_path):
