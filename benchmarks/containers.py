@@ -18,7 +18,8 @@ CLIPS = {
     "overlaps": Clip((0.4, 1.4, 1.8), 2.2, at_30_fps(2.1), overlapping=9),
     "15, then 30 fps": Clip((0.4, 0.8, 1.7, 2.5), 3.0, (*(k / 15 for k in range(15)), *(1 + k / 30 for k in range(60)))),
 }
-"""AVI has no time stamps of its own: only the steady clip can be written to it."""
+UNTIMED = {"overlaps", "15, then 30 fps"}
+"""AVI has no time stamps of its own: these cannot be written to it."""
 
 
 def main() -> None:
@@ -28,7 +29,7 @@ def main() -> None:
         for suffix, codecs in CONTAINERS.items():
             cells = []
             for name, clip in CLIPS.items():
-                if suffix == "avi" and name != "steady":
+                if suffix == "avi" and name in UNTIMED:
                     cells.append("")
                     continue
                 path = write(Path(folder) / f"clip.{suffix}", clip)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice, pairwise
+from math import inf
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ import numpy as np
 
 from facesynth.capture.square import Image
 from facesynth.inference.errors import FacesynthError
-from facesynth.speech.containers import beginning
+from facesynth.speech.containers import COUNTING, beginning
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -97,17 +98,36 @@ def _typical_rate(path: Path) -> float | None:
 def _decoded(
     container: InputContainer, stream: Any, path: Path, begin_s: float, damaged: list[float]
 ) -> Iterator[tuple[float, Image]]:
-    number = 0
+    number, last_s = 0, -inf
+    slots = _slots_s(path) if _reordered_without_times(container, stream) else None
     for frame in container.decode(stream):
         if frame.pts is None:
             continue
-        time_s = float(frame.pts * frame.time_base) - begin_s
-        if frame.is_corrupt:
+        time_s = (float(frame.pts * frame.time_base) if slots is None else next(slots, last_s)) - begin_s
+        if frame.is_corrupt or time_s <= last_s:
             damaged.append(time_s)
+        if time_s <= last_s:
+            continue
         yield time_s, _upright(frame)
-        number += 1
+        number, last_s = number + 1, time_s
     if not number:
         raise FacesynthError(f"{path} holds no picture that can be read; is it damaged?")
+
+
+# Pictures that are predicted from later ones lie in a file in another order than they are shown in. AVI has no time stamps for
+# the latter: the first that is shown belongs to the first place in the file, and so on.
+def _reordered_without_times(container: InputContainer, stream: Any) -> bool:
+    return container.format.name == COUNTING and bool(stream.codec_context.has_b_frames)
+
+
+def _slots_s(path: Path) -> Iterator[float]:
+    """The times of the places in which the file holds a picture, in order."""
+    import av
+
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        packets = [packet for packet in container.demux(stream) if packet.size and packet.dts is not None]
+        return iter(sorted(float(packet.dts * packet.time_base) for packet in packets))
 
 
 def _upright(frame: Any) -> Image:

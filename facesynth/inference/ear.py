@@ -104,6 +104,10 @@ class Ear:
         """Log-probabilities [t, V] of a whole sound [S], window by window: what was read need not be kept."""
         return (block.log_probabilities for block in self._of_whole(audio))
 
+    def read_with_layers(self, audio: ArrayLike) -> Iterator[tuple[Single, Single]]:
+        """The same with the hidden layers [t, L, W] of each window."""
+        return ((block.log_probabilities, block.hidden) for block in self._of_whole(audio))
+
     def _of_whole(self, audio: ArrayLike) -> "Iterator[Block]":
         sound = checked_audio(audio)
         state = replace(self.start(), heard=_long_enough(sound), peak=loudest(sound))

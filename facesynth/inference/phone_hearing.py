@@ -13,6 +13,7 @@ from .folder import Folder
 from .graphs import Graph, Part
 from .sound import resample
 from .speech import PhoneTrack
+from .speech_or_music import SpeechOrMusic, log_odds_at
 from .spikes import Alphabet, Placed, Placer, Spike, SpikeReader, placed_around
 
 
@@ -42,6 +43,19 @@ class PhoneHearing:
             spike for block in Ear(self.network, WHOLE).read(resample(audio, sample_rate, RATE)) for spike in reader.read(block)
         ]
         return [*found, *reader.end()]
+
+    def judged_spikes(
+        self, audio: NDArray[Any], sample_rate: int, judge: SpeechOrMusic
+    ) -> tuple[list[Spike], NDArray[np.float32]]:
+        """The same, and of each phone the log odds that it is speech and no music."""
+        reader = SpikeReader(self.alphabet)
+        found: list[Spike] = []
+        log_odds: list[NDArray[np.float32]] = []
+        for log_probabilities, hidden in Ear(self.network, WHOLE).read_with_layers(resample(audio, sample_rate, RATE)):
+            found += reader.read(log_probabilities)
+            log_odds.append(judge.log_odds(hidden))
+        found += reader.end()
+        return found, log_odds_at(found, np.concatenate(log_odds))
 
     def stream(self, *, look_ahead_s: float = 0.4, sample_rate: int | None = None) -> "PhoneStream":
         """Sound in pieces of any size; `sample_rate` must be RATE, and the look-ahead is that of the network's windows."""

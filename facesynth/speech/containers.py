@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.speech.interleaving import lost_sound
 from facesynth.speech.one_channel import Floats, one_channel
 
 if TYPE_CHECKING:
@@ -46,6 +47,9 @@ BESIDE_PICTURES = frozenset({"aac", "mp3"})
 """Codecs whose containers show by the pictures' time stamps whether they leave that in."""
 STATED = frozenset({"mov", "mp4", "m4a", "matroska", "webm", "ogg"})
 """Formats that say how much priming there is."""
+COUNTING = "avi"
+"""A format without time stamps."""
+STAMP_S = 1e-3
 LONGEST_PRIMING_S = 0.1
 FIRST_PACKETS = 200
 """A stream whose first frame does not come within so many packets is damaged."""
@@ -65,6 +69,8 @@ class Beginning:
     """Samples in front of the sound that are the encoder's, as far as the container leaves them in."""
     rate: int
     codec: str
+    counted: bool = False
+    """Whether the container states no times, but counts samples and pictures."""
 
     @property
     def zero_s(self) -> float:
@@ -118,8 +124,22 @@ def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
     if not blocks:
         return strung, begin.rate, ()
     times_s, lengths = zip(*blocks, strict=True)
-    audio, remarks = laid(path, strung, lengths, np.array(times_s) - begin.zero_s, begin.rate)
-    return audio, begin.rate, (*begin.remarks(), *remarks)
+    lost = lost_sound(path) if begin.counted else ()
+    audio, remarks = laid(path, strung, lengths, _later(np.array(times_s) - begin.zero_s, lost), begin.rate)
+    return audio, begin.rate, (*begin.remarks(), *(_said_of_lost(lost) if lost else remarks))
+
+
+def _later(times_s: NDArray[np.float64], lost: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
+    """Times [N] of blocks of a sound that counts its samples alone, moved by what was lost before them."""
+    return times_s + sum((length_s * (times_s > when_s - STAMP_S) for when_s, length_s in lost), np.zeros(len(times_s)))
+
+
+def _said_of_lost(lost: Sequence[tuple[float, float]]) -> Iterator[str]:
+    told = ", ".join(f"{length_s:.2f} s at {when_s:.2f} s" for when_s, length_s in lost)
+    yield (
+        f"AVI states no times, and some of the sound was lost: silence was put in, {told} of the sound,"
+        " to about 20 ms, by the pictures that lie beside it"
+    )
 
 
 def beginning(path: Path) -> Beginning:
@@ -139,7 +159,10 @@ def beginning(path: Path) -> Beginning:
         states = bool(STATED & set(container.format.name.split(",")))
         known = not states and (picture is None or codec in BESIDE_PICTURES)
         sound = _first_frame(container, [stream])
-        return Beginning(_time_s(sound) or 0.0, _time_s(picture), PRIMED.get(codec, 0) if known else 0, rate, codec)
+        priming = PRIMED.get(codec, 0) if known else 0
+        counted = container.format.name == COUNTING
+        seen_s = 0.0 if counted and picture is not None else _time_s(picture)
+        return Beginning(_time_s(sound) or 0.0, seen_s, priming, rate, codec, counted)
 
 
 def _first_frame(container: InputContainer, streams: Sequence[Any]) -> Any:

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
+from importlib import resources
 from itertools import pairwise
 
 import numpy as np
@@ -9,9 +11,10 @@ from numpy.typing import NDArray
 
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
+from facesynth.inference.speech_or_music import SpeechOrMusic, is_speech
 from facesynth.inference.spikes import Spike, segments_around
 from facesynth.progress import track
-from facesynth.speech.audio import no_speech, require_sound
+from facesynth.speech.audio import SILENT_DB, no_speech, require_sound
 from facesynth.speech.fitting import fit_phones
 from facesynth.speech.phone_graph import phone_hearing
 from facesynth.speech.pieces import quiet_pieces
@@ -24,6 +27,17 @@ APART_S, FEWEST = 0.5, 4
 """A pause that parts two stretches, and how many phones make one that can be judged."""
 HARDLY, UNSURE = 0.4, 0.5
 """Mean confidence of a stretch below which it is not taken for speech, and below which it is doubted."""
+DOUBTFUL = 1.0
+"""Mean log odds of speech against music below which a stretch is doubted."""
+RESTING = "what is heard is no speech: music, noise, laughter or breath? The lips rest there"
+LEVEL_S, NOTED_S, LOUD_DB = 0.05, 0.5, 25.0
+"""Sound that is no speech is told where it is so loud, beside the 95th percentile of all levels, for so long."""
+NAMED = 6
+"""Stretches that are named."""
+BESIDE_S = 0.15
+"""Beside a phone's spike the sound is the phone's."""
+BLOCK = 4096
+"""Levels computed at once."""
 _IN_THE_MODEL = {"ax": "ah", "el": "l", "em": "m", "en": "n"}
 """Phones that pocketsphinx's English model lacks, and those that stand in for them."""
 
@@ -37,32 +51,87 @@ def recognise(audio: NDArray[np.float32], rate: int, *, fit: bool = True) -> Pho
     return placed(audio, rate, speech_in(audio, rate)[0], fit=fit)
 
 
-# Music, laughter and breath are heard as phones too, but the network is not sure of them. Mean confidences of stretches: a tune
-# of strings 0.34 to 0.35; speech 0.50 and more, 0.78 at the median; in noise of 5 dB, in babble and over a telephone 0.34 and
-# more, with up to 8 % of the stretches below UNSURE.
+@cache
+def speech_or_music() -> SpeechOrMusic:
+    """What tells speech from music, with the weights that come with facesynth."""
+    with resources.files("facesynth.speech").joinpath("speech_or_music.npz").open("rb") as file, np.load(file) as stored:
+        return SpeechOrMusic(stored["weights"], float(stored["bias"]))
+
+
+# What is no speech is heard as phones, too. Instruments are told by the network's layers, phone by phone, so that a tune between
+# two sentences is found, however sure the network is of its onsets. Breath, drums and the like leave the network unsure: mean
+# confidences of stretches of speech are 0.50 and more, 0.78 at the median; in noise of 5 dB, in babble and over a telephone 0.34
+# and more, with up to 8 % of the stretches below UNSURE.
 def speech_in(audio: NDArray[np.float32], rate: int) -> tuple[list[Spike], tuple[str, ...]]:
-    """Phones heard in a sound, without stretches that are hardly speech; and a remark on each of those, and on doubtful ones.
+    """Phones heard in a sound, without what is hardly speech; and a remark on each stretch of that, and on doubtful ones.
 
     FacesynthError as from `recognise`.
     """
     require_sound(audio, rate)
+    heard, log_odds = phone_hearing().judged_spikes(audio, rate, speech_or_music())
+    spoken = is_speech(log_odds)
+    likely = dict(zip(heard, log_odds, strict=True))
+    dropped = [spike for spike, said in zip(heard, spoken, strict=True) if not said]
+    found = stretches([spike for spike, said in zip(heard, spoken, strict=True) if said])
     kept: list[Spike] = []
-    remarks: list[str] = []
-    found = stretches(phone_hearing().spikes(audio, rate))
+    doubts: list[str] = []
     for stretch, hardly in zip(found, _hardly(found), strict=True):
-        sure = _sure(stretch)
-        where = f"from {stretch[0].first_s:.1f} to {stretch[-1].last_s:.1f} s"
         if hardly:
-            remarks.append(
-                f"{where} what is heard is hardly speech ({sure:.0%} sure): music, laughter or breath? The lips rest there"
-            )
+            dropped += stretch
             continue
-        if len(stretch) >= FEWEST and sure < UNSURE:
-            remarks.append(f"{where} phones were heard in much doubt ({sure:.0%} sure): is it speech?")
         kept += stretch
+        if len(stretch) >= FEWEST and (_sure(stretch) < UNSURE or np.mean([likely[spike] for spike in stretch]) < DOUBTFUL):
+            span = _span(stretch[0].first_s, stretch[-1].last_s)
+            doubts.append(f"from {span} phones were heard in much doubt: is it speech?")
     if not kept:
         raise no_speech()
-    return kept, tuple(remarks)
+    return kept, (*_rests(list(unspoken(audio, rate, kept, dropped))), *doubts)
+
+
+def _rests(found: Sequence[tuple[float, float]]) -> Iterator[str]:
+    """What a person should know of stretches that are no speech."""
+    if found:
+        named = ", ".join(_span(*one) for one in found[:NAMED]) + (
+            f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+        )
+        yield f"from {named} {RESTING}"
+
+
+def _span(start_s: float, stop_s: float) -> str:
+    return f"{start_s:.1f} to {stop_s:.1f} s"
+
+
+def unspoken(
+    audio: NDArray[np.float32], rate: int, kept: Sequence[Spike], dropped: Sequence[Spike]
+) -> Iterator[tuple[float, float]]:
+    """Start and end in seconds of what sounds between the phones [S] that were kept, and is no speech.
+
+    A stretch counts where phones were dropped in it, or where it is loud, within LOUD_DB of the loud parts, for NOTED_S.
+    """
+    loud = np.flatnonzero(_loud(audio, rate)) * LEVEL_S
+    ends_s = [-np.inf, *(spike.last_s for spike in kept)]
+    starts_s = [*(spike.first_s for spike in kept), np.inf]
+    for before_s, after_s in zip(ends_s, starts_s, strict=True):
+        heard_s = loud[(loud > before_s + BESIDE_S) & (loud < after_s - BESIDE_S - LEVEL_S)]
+        taken_s = [time_s for spike in dropped if before_s < spike.first_s < after_s for time_s in (spike.first_s, spike.last_s)]
+        if taken_s or len(heard_s) * LEVEL_S >= NOTED_S:
+            both_s = [*taken_s, *heard_s, *(heard_s[-1:] + LEVEL_S)]
+            yield max(0.0, min(both_s)), max(both_s)
+
+
+def _loud(audio: NDArray[np.float32], rate: int) -> NDArray[np.bool_]:
+    """[N] of each LEVEL_S whether it is within LOUD_DB of the loud parts, and no silence."""
+    size = max(1, round(LEVEL_S * rate))
+    level_db = np.concatenate(
+        [_level_db(audio[first : first + size * BLOCK], size) for first in range(0, len(audio) - size + 1, size * BLOCK)]
+    )
+    return level_db > max(SILENT_DB, float(np.percentile(level_db, 95)) - LOUD_DB)
+
+
+def _level_db(audio: NDArray[np.float32], size: int) -> NDArray[np.float64]:
+    """[N] of each `size` samples, the last incomplete ones left out."""
+    pieces = np.asarray(audio[: len(audio) // size * size], np.float64).reshape(-1, size)
+    return 10 * np.log10(np.square(pieces).mean(axis=1) + 1e-12)
 
 
 def _sure(stretch: Sequence[Spike]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from facesynth.methods.registry import able, ask, load_trained, read_option, req
 from facesynth.methods.trained import TrainedModel
 from facesynth.stage.expressed import expressed
 from facesynth.stage.request import AUTO, Part, Request
+from facesynth.stage.silent_pauses import SilentPauses
 from facesynth.zoo.shelf import load
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class Cast:
     """Maps the motion to another emotion."""
     detector: EmotionDetector | None = None
     """Hears the emotion."""
+    _pauses: SilentPauses = field(default_factory=SilentPauses)
 
     @property
     def members(self) -> tuple[TrainedModel, ...]:
@@ -68,7 +70,8 @@ class Cast:
         return motion
 
     def said(self, speech: Speech) -> Speech:
-        """What the mouth is to say: neutrally, where somebody else adds the emotions."""
+        """What the mouth is to say: nothing in long pauses, neutrally where somebody else adds the emotions."""
+        speech = self._pauses.of(speech)
         if self.expression is None:
             return speech
         plain = NEUTRAL if NEUTRAL in self.mouth.emotions else self.mouth.emotions[0]

@@ -102,12 +102,22 @@ def encoded_sound(stream, clip):
     frame = av.AudioFrame.from_ndarray(sound(clip)[None], format="fltp", layout="mono")
     frame.rate, frame.pts, frame.time_base = RATE, 0, Fraction(1, RATE)
     resampler = av.AudioResampler(format=stream.format.name, layout="mono", rate=RATE)
-    for packet in [*(p for part in resampler.resample(frame) for p in stream.encode(part)), *stream.encode()]:
+    packets = [*(p for part in resampler.resample(frame) for p in stream.encode(part)), *stream.encode()]
+    for packet in packets if stream.frame_size else in_pieces(stream, clip):
         if packet.pts is not None:
             overlaps = min(max(0, (packet.pts - RATE) // 1024), clip.overlapping) if clip.overlapping else 0
             by_s = -overlaps * 512 / RATE + sum(by for since, by in clip.moved if packet.pts * packet.time_base >= since)
             packet.pts += round(by_s / packet.time_base)
             packet.dts = packet.pts
+        yield packet
+
+
+def in_pieces(stream, clip):
+    """Packets of 1,024 samples of 16 bits, as recorders lay them down."""
+    samples = (sound(clip) * 32767).astype("<i2")
+    for first in range(0, len(samples), 1024):
+        packet = av.Packet(samples[first : first + 1024].tobytes())
+        packet.stream, packet.pts, packet.time_base = stream, first, Fraction(1, RATE)
         yield packet
 
 

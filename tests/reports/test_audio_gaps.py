@@ -9,6 +9,7 @@ from facesynth.corpus import Corpus
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import load_audio, read_sound
 from facesynth.speech.containers import laid
+from facesynth.speech.interleaving import Chunks, gaps_between
 
 CLOSE_S = 0.02
 GAP = Clip((0.35, 1.6, 2.1), 2.6, at_30_fps(2.6), moved=((0.5, 0.8),))
@@ -49,6 +50,34 @@ def test_sound_that_begins_beside_the_pictures(tmp_path, suffix, by_s):
     assert largest_error_s(path, clip) < CLOSE_S
     said = [remark for remark in read_sound(path).remarks if "begins" in remark]
     assert bool(said) == (by_s > 0)
+
+
+AVI = {
+    "gap": Clip((0.35, 2.4, 3.1), 4.0, at_30_fps(4.8), moved=((0.5, 0.8),)),
+    "two gaps": Clip((0.35, 2.4, 3.1), 4.0, at_30_fps(4.85), moved=((0.5, 0.3), (1.2, 0.55))),
+    "late": Clip((0.85, 2.4, 3.1), 4.0, at_30_fps(4.5), moved=((-1.0, 0.5),)),
+}
+
+
+@pytest.mark.parametrize("sound", ["libmp3lame", "pcm_s16le", "ac3", "aac"])
+@pytest.mark.parametrize("kind", sorted(AVI))
+def test_sound_lost_from_an_avi_is_found_by_the_pictures_beside_it(tmp_path, kind, sound):
+    path = write(tmp_path / "a.avi", AVI[kind], ("mpeg4", sound))
+    assert largest_error_s(path, AVI[kind]) < CLOSE_S
+    assert any(remark.startswith("AVI states no times, and some of the sound was lost") for remark in read_sound(path).remarks)
+
+
+def test_sound_that_lies_unevenly_in_an_avi_is_not_taken_for_lost():
+    times_s, pictures_s = np.arange(200) * 0.024, np.arange(150) / 30
+    uneven = times_s + np.where(np.arange(200) % 40 < 20, 0.0, 0.4)
+    for shorter_s in (0.0, 0.4):
+        places = np.searchsorted(pictures_s, uneven)
+        framed = np.concatenate([[-np.inf], pictures_s, [np.inf]])
+        assert len(gaps_between(Chunks(times_s, framed[places], framed[places + 1], shorter_s))) == 0
+    lost = times_s + np.where(np.arange(200) < 100, 0.0, 0.4)
+    places = np.searchsorted(pictures_s, lost)
+    ((when_s, length_s),) = gaps_between(Chunks(times_s, framed[places], framed[places + 1], 0.4))
+    assert (round(when_s, 3), round(length_s, 2)) == (2.4, 0.4)
 
 
 def test_rounded_and_missing_stamps_move_nothing():

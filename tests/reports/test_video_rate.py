@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from closing_clips import Clip, largest_error_s, opening, write
+from closing_clips import Clip, largest_error_s, opening, seen_s, write
 
 from facesynth.capture.track import at_regular_times
+from facesynth.capture.video import open_video
 from facesynth.motion.irregular import steady_rate
 
 PAUSE = tuple(t for t in np.arange(75) / 25 if not 1.2 < t < 1.7)
@@ -23,6 +24,14 @@ def test_closures_are_seen_when_they_are_heard(tmp_path, suffix, kind):
     pictures_s, closures_s = VARYING[kind]
     clip = Clip(closures_s, 3.0, pictures_s)
     assert largest_error_s(write(tmp_path / f"a.{suffix}", clip), clip) < 0.02
+
+
+def test_pictures_of_an_avi_that_lie_in_another_order_than_they_are_shown(tmp_path):
+    path = write(tmp_path / "a.avi", Clip(), ("libx264", "pcm_s16le"))
+    assert np.abs(seen_s(path) - Clip().closures_s).max() < 0.02
+    with open_video(path) as video:
+        times_s = [time_s for time_s, _ in video.images]
+    np.testing.assert_allclose(np.diff(times_s), 1 / 30, atol=0.002)
 
 
 @pytest.mark.parametrize(("kind", "fps", "error"), [("pause", 25, 1e-6), ("15 then 30", 30, 0.05), ("trembling", 30, 0.02)])
