@@ -17,6 +17,7 @@ from facesynth.cli.mocap import Said, keep_written_of, read_layout, said_of_file
 from facesynth.cli.options import as_json, show, spread_over
 from facesynth.cli.transcriber import chosen_transcriber
 from facesynth.cli.types import FILE, FOLDER
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -326,8 +327,6 @@ def _remarks(remarks: Mapping[str, Iterable[str]]) -> list[str]:
 
 def _leave_if_nothing(nothing: bool, reasons: Mapping[str, str], what: str) -> None:
     """One clear error where a command could do nothing at all."""
-    from facesynth.inference.errors import FacesynthError
-
     if nothing and reasons:
         name, reason = next(iter(reasons.items()))
         raise FacesynthError(f"{what}; {name}: {reason}")

@@ -9,6 +9,7 @@ import click
 
 from facesynth.cli.options import as_json, show
 from facesynth.cli.types import FILE, FOLDER
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.corpus.journal import Edit
@@ -99,7 +100,6 @@ def add(
 ) -> None:
     """Add a node that nobody recorded: motion from a file, or drawn as a path on a phone's map."""
     from facesynth.corpus import Corpus
-    from facesynth.inference.errors import FacesynthError
     from facesynth.methods.drawing import add_motion, drawn_motion, motion_from_file, read_path
     from facesynth.methods.registry import load
 
@@ -145,8 +145,6 @@ def list_suspects(folder: Path, model: Path | None, most: int, as_json: bool) ->
 
 def _checked(corpus: Any, nodes: Iterable[str], *, removed: bool) -> list[str]:
     """The names as they are written, without repetition; FacesynthError where one of them would stay as it is."""
-    from facesynth.inference.errors import FacesynthError
-
     names = list(dict.fromkeys(corpus.known_node(name) for name in nodes))
     gone = corpus.removed_nodes()
     for name in names:

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from facesynth.cli.options import as_json, show
+from facesynth.inference.errors import FacesynthError
 
 CORE = ("numpy", "scipy", "onnxruntime", "onnx", "numba", "av", "soundfile", "pocketsphinx", "hama", "safetensors")
 """Distributions whose versions matter most where something goes wrong."""
@@ -88,7 +89,6 @@ def _caches() -> list[Finding]:
     from facesynth.cache import cache_dir
     from facesynth.capture.models import fetched
     from facesynth.face.rig.anny import head_folder
-    from facesynth.inference.errors import FacesynthError
     from facesynth.zoo.shelf import names
 
     try:

@@ -11,6 +11,7 @@ import click
 
 from facesynth.cli.options import grouped
 from facesynth.cli.types import FILE
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -49,8 +50,6 @@ class Said:
 
     def require_nothing(self) -> None:
         """FacesynthError where the corpus is there: what its files are was said when it was made."""
-        from facesynth.inference.errors import FacesynthError
-
         if self != Said():
             raise FacesynthError(
                 "--layout, --fps and --axes are for a new corpus, which keeps them (recordings.yaml); for files that differ"
@@ -73,7 +72,6 @@ said_of_files = grouped(
 def read_layout(path: Path) -> Layout:
     """The layout of a layout file."""
     from facesynth.corpus.importers.description import read_description
-    from facesynth.inference.errors import FacesynthError
 
     layout = read_description(path).layout
     if layout is None:

@@ -8,6 +8,7 @@ import click
 
 from facesynth.cli.options import as_json, seeded
 from facesynth.cli.types import FILE
+from facesynth.inference.errors import unknown
 
 TYPES = (".html", ".md", ".csv", ".json")
 
@@ -29,7 +30,6 @@ def reproduce(paper: str, corpus: Path, output: Path | None, as_json: bool, **li
     from facesynth.corpus import Corpus
     from facesynth.evaluation.papers import reproduce as run
     from facesynth.evaluation.report import require_drawing
-    from facesynth.inference.errors import unknown
 
     if output and output.suffix not in TYPES:
         raise unknown("output type", output.suffix or str(output), TYPES)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from facesynth.cli.types import FILE
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +43,6 @@ def studio(
     Nobody but this computer can reach it, and only with the address that is printed. Everything is kept as it is done;
     Ctrl-C ends it.
     """
-    from facesynth.inference.errors import FacesynthError
     from facesynth.studio.serve import serve
 
     lines: dict[str, tuple[Speech, Sequence[Segment]]] = {}

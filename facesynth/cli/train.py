@@ -11,6 +11,7 @@ import click
 
 from facesynth.cli.options import as_json, seeded, show, spread_over
 from facesynth.cli.types import FILE
+from facesynth.inference.errors import FacesynthError
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -144,7 +145,6 @@ def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_alone(method: str, workers: Workers) -> None:
     from facesynth.corpus.workers import ALONE
-    from facesynth.inference.errors import FacesynthError
 
     if workers != ALONE:
         raise FacesynthError(
@@ -154,8 +154,6 @@ def _require_alone(method: str, workers: Workers) -> None:
 
 def _require_speech(recordings: Corpus) -> None:
     """FacesynthError, with the reasons, where no recording is usable."""
-    from facesynth.inference.errors import FacesynthError
-
     if not len(recordings) and recordings.records:
         reasons = list(dict.fromkeys(record.reason or "marked unusable" for record in recordings.records))
         raise FacesynthError(

@@ -9,6 +9,7 @@ import click
 
 from facesynth.cli.options import as_json, seeded, show
 from facesynth.cli.types import FILE
+from facesynth.inference.errors import FacesynthError
 
 
 @click.command("tune")
@@ -43,7 +44,6 @@ def tune(
 
 def _tuner(method: str | None) -> tuple[str, str]:
     """Name of the method and of what searches its settings; FacesynthError where nothing does, or it must be chosen."""
-    from facesynth.inference.errors import FacesynthError
     from facesynth.methods.registry import capabilities_of, known_capabilities
 
     tunable = {one.name: one.tuner for one in known_capabilities()[0] if one.tuner}

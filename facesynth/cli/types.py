@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from facesynth.inference.errors import FacesynthError
+
 if TYPE_CHECKING:
     from facesynth.methods.capabilities import Option
     from facesynth.stage.request import Part
@@ -24,7 +26,6 @@ class PartType(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Part:
         """The part as it was asked for."""
-        from facesynth.inference.errors import FacesynthError
         from facesynth.stage.request import Part
 
         try:

@@ -169,8 +169,6 @@ def _check_whole(motion: Motion) -> None:
 def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if motion.layout.kind == "curves":
         return _curves(motion), None
-    from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
-
     known = np.zeros((len(motion), len(rig.names)))
     if motion.eyes is not None:
         known = gaze_weights(known, motion.eyes[:, 1:])
@@ -204,7 +202,6 @@ def _head_on(rig: Rig, motion: Motion, gain: float) -> NDArray[np.float64]:
 
 
 def _pose_centre(rig: Rig, motion: Motion) -> NDArray[np.float64]:
-
     layout = motion.layout
     if layout.kind != "markers":
         return PIVOT_MM
