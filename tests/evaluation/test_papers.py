@@ -118,7 +118,6 @@ def test_speech_as_long_as_a_paper_s_says_the_same_phones(corpus):
         joined([], 3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("paper", ["cao2005", "deng2006"])
 def test_the_others_run(corpus, paper):
     result = reproduce(paper, corpus, test_limit=3)
