@@ -82,7 +82,7 @@ def test_videos_become_a_corpus_of_followed_points(studio):
         assert np.corrcoef(opening, -loudness(int(utterance.id[1:])))[0, 1] > 0.95
         video = kept_videos(corpus)[utterance.id]
         assert video.read_bytes() == (folder / "clips" / video.name).read_bytes()
-        np.testing.assert_allclose(shapes_beside(video).to_motion().frames, utterance.motion.frames, atol=1e-3)
+        np.testing.assert_allclose(shapes_beside(video).to_motion(corpus.layout).frames, utterance.motion.frames, atol=1e-3)
     assert not any(problem["grave"] for problem in json.loads(run(corpus_group, "check", folder / "actor", "--json"))["problems"])
 
 
@@ -257,3 +257,21 @@ def test_help_does_not_load_torch():
 
     code = "import sys; from facesynth.cli.corpus import corpus_group; sys.exit('torch' in sys.modules or 'cv2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("method", "settings"), [("efase", ()), ("network", ("steps=40", "features=log_mel"))])
+def test_any_methods_motion_drives_the_real_face(studio, tmp_path, method, settings):
+    """Trained and spoken by the same two commands as the linear dynamical system, with the same pictures."""
+    folder, model = studio[0], tmp_path / f"{method}.safetensors"
+    trained = run(train, method, folder / "actor", *settings, "-o", model)
+    assert face_path(model).name in trained
+    out = tmp_path / "new.mp4"
+    sounds = folder / "clips" / "c3.mp4", folder / "clips" / "c3.lab"
+    report = json.loads(run(speak, model, sounds[0], "--phones", sounds[1], "-o", out, "-o", tmp_path / "new.npz", "--json"))
+    assert report["folded_triangles"] == 0
+    video = read_video(out)
+    assert video.frames.shape == (FRAMES, HEIGHT, WIDTH, 3)
+    with np.load(tmp_path / "new.npz") as kept:
+        moved = np.ptp(kept["frames"], axis=0).max()
+    recorded = np.ptp(Corpus.open(folder / "actor")["c3"].motion.frames, axis=0).max()
+    assert 0.3 * recorded < moved < 2 * recorded

@@ -61,7 +61,7 @@ def test_shapes_keep_the_mouth_and_lose_the_head(chewed):
 
 def test_motion_and_back(chewed):
     shape, _ = chewed[2].find(chewed[1][0])
-    motion = shape.to_motion()
+    motion = shape.to_motion(chewed[2].layout)
     assert motion.layout.unit == "px"
     np.testing.assert_allclose(picture_points(motion.frames), shape.points, atol=1e-3)
 

@@ -16,7 +16,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
 from facesynth.motion.planar import HeadMaps
 
-VERSION = 2
+VERSION = 3
 """Raised where following changes its results, so that old shapes are not used any more."""
 
 
@@ -65,7 +65,7 @@ def _found(reference: Reference, footage: Footage, video: Path) -> tuple[Shapes,
 def _place(video: Path, reference: Reference) -> Path:
     if not video.is_file():
         raise FacesynthError(f"{video}: no such file")
-    made_by = hashlib.sha256(str(VERSION).encode())
+    made_by = hashlib.sha256(f"{VERSION} {reference.mouth} {reference.face}".encode())
     for array in (reference.picture, reference.points, reference.mean):
         made_by.update(np.ascontiguousarray(array).tobytes())
     return cache_dir("tracks") / f"{hash_file(video)[:32]}-points-{made_by.hexdigest()[:16]}.npz"

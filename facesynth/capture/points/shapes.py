@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.capture.points.tracking import Points, neighbours_mean
+from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.motion.gaps import fill_gaps
-from facesynth.motion.planar import HeadMaps, motion_frames, tracked_layout
+from facesynth.motion.planar import HeadMaps, motion_frames
 
 ROBUST_ROUNDS = 5
 FEWEST_STILL = 6
@@ -30,9 +31,13 @@ class Shapes:
     """Where the head really was."""
     fps: float
 
-    def to_motion(self) -> Motion:
+    def joined(self, others: Points) -> "Shapes":
+        """With other points [T, L, 2] px of the same pictures behind them, on the same head."""
+        return Shapes(np.concatenate([self.points, self.head.to_head(others)], axis=1), self.head, self.fps)
+
+    def to_motion(self, layout: Layout) -> Motion:
         """As motion of landmarks; a layout's y points up."""
-        return Motion(motion_frames(self.points), self.fps, tracked_layout(self.points.shape[1]))
+        return Motion(motion_frames(self.points), self.fps, layout)
 
 
 def mean_shape(reference: Points, lower: int, clips: list[Points], fps: float) -> NDArray[np.float64]:

@@ -25,7 +25,6 @@ from facesynth.corpus.corpus import Corpus
 from facesynth.corpus.files import check_id
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
-from facesynth.motion.planar import tracked_layout
 from facesynth.motion.resample import resample
 from facesynth.progress import track
 from facesynth.speech.audio import load_audio
@@ -35,6 +34,7 @@ FOLDER = "video"
 FIRST_CLIPS = 6
 """The points are chosen on so many clips, taken evenly from all."""
 NOTES = "Followed from video: {} Shi-Tomasi points of the lower face, pixels of the first picture, the head's motion taken out."
+OF_THE_MOUTH = " Lips and chin by the face mesh."
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,11 @@ class Where:
     """[H, W] the lower face in the first picture."""
     face: int | None = None
     """Which one, counted from the left, where several are seen."""
+
+    @property
+    def is_found(self) -> bool:
+        """Whether the networks look for the face, and find its lips too: nobody said where it is."""
+        return self.box is None and self.mask is None
 
 
 def corpus_from_points(folder: Path, paths: Iterable[str | Path], header: Mapping[str, Any], where: Where) -> Corpus:
@@ -63,15 +68,16 @@ def corpus_from_points(folder: Path, paths: Iterable[str | Path], header: Mappin
         )
     clips = _first_clips(videos)
     region = face_region(clips[0].frames[0], box=where.box, mask=where.mask, face=where.face)
-    reference = Reference.choose(clips, region)
+    reference = Reference.choose(clips, region, mouth=where.is_found, face=where.face)
     reference.save(folder / POINTS)
-    notes = {"notes": NOTES.format(reference.lower)}
-    return Corpus.create(folder, layout=tracked_layout(reference.lower), fps=clips[0].fps, **{**notes, **header})
+    notes = {"notes": NOTES.format(reference.lower) + (OF_THE_MOUTH if reference.mouth else "")}
+    return Corpus.create(folder, layout=reference.layout, fps=clips[0].fps, **{**notes, **header})
 
 
 def motion_from_points(folder: Path, video: Path, sound: Path, fps: float) -> tuple[Motion, tuple[str, ...]]:
     """The points of a video, at the rate of the corpus in `folder`, and what was noticed."""
-    shapes, following, resampled = kept_shapes(video, Reference.load(folder / POINTS))
+    reference = Reference.load(folder / POINTS)
+    shapes, following, resampled = kept_shapes(video, reference)
     drift = following.drift
     remarks = [
         f"{following.lost_share:.1%} of the points' samples lost and filled in; there and back they drift by"
@@ -79,7 +85,7 @@ def motion_from_points(folder: Path, video: Path, sound: Path, fps: float) -> tu
     ]
     if resampled:
         remarks.append(f"the video's rate varies: motion was interpolated at the pictures' true times, at {shapes.fps:g} fps")
-    motion = shapes.to_motion()
+    motion = shapes.to_motion(reference.layout)
     if sound != video:
         clock = clock_between(*load_audio(video), *load_audio(sound))
         motion = on_clock(motion, clock)
