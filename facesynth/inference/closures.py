@@ -68,11 +68,14 @@ def keep_shut(changed: Floats, before: Floats, layout: Layout) -> Floats:
     return points.reshape(changed.shape)
 
 
-def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: float, fps: float) -> Floats:
+def close_at(
+    frames: Floats, layout: Layout, spans: Iterable[Span], nearest: float, fps: float, along: Floats | None = None
+) -> Floats:
     """Frames [T, C] whose lips come as near to each other as the gap `nearest` within each span of frames.
 
     What is missing is added around the narrowest frame, and fades within half the span, but neither faster than 40 ms
-    nor slower than 150 ms. Layouts without lip pairs stay as they are.
+    nor slower than 150 ms. Lips alone move, both half of the way, or the whole face as `closing_direction` says, `along` [C].
+    Layouts without lip pairs stay as they are.
     """
     if not has_lips(layout):
         return frames
@@ -85,13 +88,31 @@ def close_at(frames: Floats, layout: Layout, spans: Iterable[Span], nearest: flo
         middle, reach = start + int(heights.argmin()), closing_frames(start, stop, fps)
         near = np.arange(max(0, int(middle - reach)), min(len(points), int(middle + reach) + 1))
         amount = 0.5 + 0.5 * np.cos(np.pi * np.clip((near - middle) / reach, -1, 1))
-        correction = np.zeros((len(near), pairs, layout.dimension))
-        correction[..., 1] = (amount * (heights.min() - nearest))[:, None] / 2
-        some = points[near]
-        bring_together(some, layout, correction)
-        points[near] = some
+        narrower = (amount * (heights.min() - nearest))[:, None]
+        if along is not None:
+            out[near] += narrower * along
+        else:
+            correction = np.zeros((len(near), pairs, layout.dimension))
+            correction[..., 1] = narrower / 2
+            some = points[near]
+            bring_together(some, layout, correction)
+            points[near] = some
         let_go(out)
     return out
+
+
+def closing_direction(frames: Floats, layout: Layout) -> Floats | None:
+    """[C] how a face moves, on average over frames [N, C], while its lips come nearer by one unit: the jaw rises, cheeks follow.
+
+    The regression of every channel on the gap, so that the gap itself narrows by exactly one. None where there are no lips, or
+    they never move.
+    """
+    if not has_lips(layout):
+        return None
+    centred = frames - frames.mean(axis=0)
+    opening = gap(centred, layout)
+    power = float(np.dot(opening, opening))
+    return -(opening @ centred) / power if power > 1e-9 * len(frames) else None
 
 
 def closing_frames(start: int, stop: int, fps: float) -> float:

@@ -69,6 +69,8 @@ class LdsSettings:
     """How much of the noise belongs to each state of the speech; without phones `unknown` counts."""
     closed_gap: float | None = None
     """How near the lips come at a p, b or m; None: they are left as they are."""
+    closing: tuple[float, ...] | None = None
+    """[C] how the whole face moves as the lips come nearer by one unit, see `closing_direction`; None: lips alone move."""
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:
@@ -76,7 +78,9 @@ class LdsSettings:
         window, lead_ms, settling_s = int(plain["window_samples"]), float(plain["lead_ms"]), float(plain["settling_s"])
         features, components, states = (int(plain[name]) for name in ("features", "components", "states"))
         amounts = {name: float(plain["noise_amounts"][name]) for name in STATES}
-        return cls(window, lead_ms, settling_s, features, components, states, amounts, plain["closed_gap"])
+        along = plain.get("closing")
+        closing = None if along is None else tuple(map(float, along))
+        return cls(window, lead_ms, settling_s, features, components, states, amounts, plain["closed_gap"], closing)
 
     def windows(self, fps: float, rate: int) -> FrameWindows:
         """Of sound at a rate in Hz, for frames at `fps`."""
@@ -124,7 +128,8 @@ class Lds:
         frames, _ = self._frames(state, count, amounts_along(self.settings.noise_amounts, speech.phones, self.fps, count))
         if self.settings.closed_gap is not None:
             spans = bilabial_spans(speech.phones, self.fps)
-            closed = close_at(frames.astype(np.float64), self.layout, spans, self.settings.closed_gap, self.fps)
+            along = None if self.settings.closing is None else np.array(self.settings.closing)
+            closed = close_at(frames.astype(np.float64), self.layout, spans, self.settings.closed_gap, self.fps, along)
             frames = closed.astype(np.float32)
         return Motion(frames, self.fps, self.layout)
 
@@ -210,6 +215,7 @@ class LdsStream:
 
 def load_lds(folder: Folder, threads: int) -> Lds:
     """The system that an `lds` model was exported to."""
+    _require_new(folder)
     manifest, settings = folder.manifest, LdsSettings.from_dict(folder.settings)
     windows = settings.windows(float(manifest["fps"]), int(manifest["sample_rate"]))
     stated_s = float(manifest["latency"]["look_ahead_s"])
@@ -220,3 +226,12 @@ def load_lds(folder: Folder, threads: int) -> Lds:
         )
     graphs = {name: Graph(folder, name, threads) for name in ("features", "innovations", "rollout")}
     return Lds(folder.layout, tuple(manifest["emotions"]), windows, settings, manifest=manifest, **graphs)
+
+
+def _require_new(folder: Folder) -> None:
+    """FacesynthError for a folder from before noise depended on the speech, and lips were shut: it would move otherwise."""
+    if lacking := [name for name in ("noise_amounts", "closed_gap") if name not in folder.settings]:
+        raise FacesynthError(
+            f"{folder.path / MANIFEST} was exported by an older facesynth: it lacks {' and '.join(lacking)}; wanted one that says"
+            " how much noise there is in each state of the speech and how lips shut: export the model again"
+        )

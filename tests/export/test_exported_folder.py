@@ -126,6 +126,7 @@ def with_(value, *keys):
 
 
 FOREIGN = [
+    ("lds", without("settings", "noise_amounts"), "older facesynth: it lacks noise_amounts; wanted .* export the model again"),
     ("lds", with_([], "files"), "states what cannot be"),
     ("lds", with_(None, "graphs"), "states what cannot be"),
     ("lds", without("files", "rollout.onnx", "bytes"), "lacks 'bytes'"),

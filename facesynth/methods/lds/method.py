@@ -8,6 +8,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.inference.arrays import Ints
+from facesynth.inference.closures import closing_direction
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.lds import Lds, LdsSettings, LdsStream
 from facesynth.inference.motion import Motion
@@ -117,6 +118,8 @@ class LDS(Method):
         gaps = [gap for piece in pieces for gap in piece.gaps]
         if self.config["close_lips"] and gaps:
             self.facts["closed_gap"] = float(np.median(gaps))
+            direction = closing_direction(np.concatenate([_centred(piece.frames) for piece in pieces]), self.fitted_layout)
+            self.facts["closing"] = None if direction is None else direction.tolist()
         self.facts |= {
             "context_ms": float(self.config["context_ms"]),
             "frames_left_out_for_gaps": left_out,
@@ -163,8 +166,11 @@ class LDS(Method):
         """Sizes and times of the trained system."""
         features, components, states = len(self.features.scale), len(self.shape.scale), len(self.rollout.A)
         periodogram, amounts = self.periodogram, self.facts.get("noise_amounts", dict.fromkeys(STATES, 1.0))
-        gap = self.facts.get("closed_gap")
-        return LdsSettings(periodogram.length, periodogram.lead_ms, SETTLING_S, features, components, states, amounts, gap)
+        gap, along = self.facts.get("closed_gap"), self.facts.get("closing")
+        closing = None if along is None else tuple(along)
+        return LdsSettings(
+            periodogram.length, periodogram.lead_ms, SETTLING_S, features, components, states, amounts, gap, closing
+        )
 
     @property
     def periodogram(self) -> Periodogram:
@@ -217,6 +223,10 @@ class LDS(Method):
 
 def _encoded(part: Standardised, frames: np.ndarray) -> Array:
     return part.encode(torch.from_numpy(frames)).double().numpy()
+
+
+def _centred(frames: np.ndarray) -> Array:
+    return frames.astype(np.float64) - frames.mean(axis=0)
 
 
 def _check(config: dict[str, Any]) -> None:
