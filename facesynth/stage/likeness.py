@@ -56,7 +56,7 @@ class Likeness:
         steps = self.motion if np.isclose(self.motion.fps, fps, rtol=1e-6) else resample(self.motion, fps)
         pictures = likeness(steps, self.speaker, report, self.choice)
         write_video(path, pictures, fps, self.speech.audio, self.speech.sample_rate)
-        facts = {name: getattr(report, name) for name in ("real_time_factor", "folded_triangles", "jumps")}
+        facts = {name: getattr(report, name) for name in ("real_time_factor", "folded_triangles", "relaxed_frames", "jumps")}
         return Written(
             f"{path}: {self.speech.duration_s:.2f} s at {fps:.5g} fps; real-time factor of the drawing"
             f" {report.real_time_factor:.2f}, folded triangles {report.folded_triangles}, jumps between pictures {report.jumps}",

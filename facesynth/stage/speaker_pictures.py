@@ -12,7 +12,7 @@ from facesynth.corpus.importers.points import kept_videos, shapes_beside
 from facesynth.face.texture.speaker import Speaker, lower_face_window
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.trained import TrainedModel
-from facesynth.motion.planar import HeadMaps, is_tracked
+from facesynth.motion.planar import HeadMaps, has_mouth, inner_outline, is_tracked
 from facesynth.progress import track
 
 LARGEST_PICTURES_BYTES = 300_000_000
@@ -71,6 +71,8 @@ def speaker_of(corpus: Corpus) -> Speaker:
         background_linear=background.linear,
         background_shift=background.shift,
         fps=shapes[calm].fps,
+        inner_lips=inner_outline(corpus.layout),
+        jaw=corpus.layout.group("jaw") if has_mouth(corpus.layout) else np.zeros(0, np.int64),
     )
 
 

@@ -38,7 +38,7 @@ def speaker_of(pictures, shapes, starts):
 
 
 def test_a_recorded_shape_over_its_own_picture_is_that_picture(speaker):
-    face, report = TexturedFace(speaker), Report()
+    face, report = TexturedFace(speaker, fade_s=0.0), Report()
     numbers = np.arange(20)
     drawn = np.stack(list(face.draw(speaker.shapes, numbers, report, "nearest")))
     chosen = face.choose(speaker.shapes, "nearest")
@@ -101,12 +101,26 @@ def test_brightness_follows_the_background(speaker):
     assert drawn[middle].mean() == pytest.approx(0.8 * speaker.backgrounds[0][middle].mean(), rel=0.03)
 
 
-def test_folded_triangles_are_reported(speaker):
-    torn = speaker.shapes[:1].copy()
+def test_a_shape_that_would_tear_the_picture_is_relaxed_and_told_of(speaker):
+    torn = speaker.shapes[:2].copy()
     torn[0, 0] += [40, 30]
     report = Report()
-    list(TexturedFace(speaker).draw(torn, np.array([0]), report))
-    assert report.folded_triangles > 0
+    list(TexturedFace(speaker).draw(torn, np.array([0, 1]), report))
+    assert (report.relaxed_frames, report.folded_triangles) == (1, 0)
+
+
+def test_a_jump_is_faded_over(speaker):
+    """Where the pictures jump, the step that one sees becomes smaller, and all else stays."""
+    shapes = np.concatenate([speaker.shapes[2:6], speaker.shapes[15:19]])
+    background = np.full(8, 14)
+    hard, soft = (
+        np.stack(list(TexturedFace(speaker, fade_s=fade_s).draw(shapes, background, Report(), "nearest"))).astype(float)
+        for fade_s in (0.0, 0.12)
+    )
+    step = [np.abs(np.diff(drawn, axis=0)).mean(axis=(1, 2, 3)) for drawn in (hard, soft)]
+    jump = int(step[0].argmax())
+    assert step[1].max() < 0.7 * step[0].max()
+    assert np.array_equal(hard[: jump + 1], soft[: jump + 1])
 
 
 def test_the_coherent_path_is_the_best_of_all():

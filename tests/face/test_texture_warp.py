@@ -135,6 +135,25 @@ def test_folded_triangles_are_counted(mesh):
     assert (signed_areas(mesh.reference, mesh.triangles) > 0).all()
 
 
+@pytest.mark.parametrize("size_px", [1.0, 6.0, 40.0])
+def test_unfolded_meshes_have_no_folds(mesh, size_px):
+    rng = np.random.default_rng(3)
+    vertices = mesh.vertices(mesh.reference[: mesh.moving] + rng.normal(scale=size_px, size=(20, mesh.moving, 2)))
+    relaxed = mesh.unfolded(vertices)
+    assert (signed_areas(relaxed, mesh.triangles) > 0).all()
+    assert np.array_equal(relaxed[:, mesh.moving :], vertices[:, mesh.moving :]), "the ring stands still"
+
+
+def test_whole_meshes_stay_and_only_what_folds_is_moved(mesh):
+    gentle = mesh.vertices(mesh.reference[: mesh.moving] + np.array([0.2, -0.1]))
+    assert np.array_equal(mesh.unfolded(gentle[None])[0], gentle)
+    torn = mesh.reference[: mesh.moving].copy()
+    torn[0] += [30, 0]
+    moved = np.abs(mesh.unfolded(mesh.vertices(torn)[None])[0] - mesh.vertices(torn)).max(axis=1) > 0
+    assert moved[0]
+    assert moved.mean() < 0.5
+
+
 def test_meshes_need_an_area():
     with pytest.raises(FacesynthError, match="one line"):
         ringed_mesh(np.column_stack([np.arange(5.0), np.arange(5.0)]))

@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from facesynth.face.texture.mesh import Mesh, ringed_mesh
+from facesynth.face.texture.interior import Interior
+from facesynth.face.texture.mesh import Mesh, mesh_without_folds
 from facesynth.face.texture.speaker import Speaker, within
 from facesynth.face.texture.warp import PiecewiseAffineWarp, places_in, sample
 from facesynth.inference.errors import FacesynthError
-from facesynth.motion.planar import HeadMaps
 from facesynth.motion.search.cheapest import cheapest
 from facesynth.motion.search.pictures import PictureSteps
 
-CANDIDATES = 48
+JUMP_WEIGHT = 2.0
+"""How much a jump between training pictures costs, of a typical distance of shapes; see `coherent`."""
+FADE_S = 0.12
+"""How long one picture fades into the other where they jump."""
+CANDIDATES = 96
 """Nearest training shapes that are considered for each frame."""
 
 
@@ -34,7 +38,7 @@ def coherent(
     shapes: NDArray[np.float64],
     looks: NDArray[np.float64],
     clip_starts: NDArray[np.bool_],
-    jump_weight: float = 0.1,
+    jump_weight: float = JUMP_WEIGHT,
 ) -> NDArray[np.int64]:
     """[T] training pictures near the targets whose sequence does not flicker.
 
@@ -83,7 +87,9 @@ class Report:
     frames: int = 0
     seconds: float = 0.0
     folded_triangles: int = 0
-    """Triangles turned over, summed over frames: the picture is torn there."""
+    """Triangles turned over, summed over frames: the picture would be torn there."""
+    relaxed_frames: int = 0
+    """Frames whose shape would have turned triangles over: some of its points were drawn elsewhere, see `Mesh.unfolded`."""
     jumps: int = 0
     """How often the next picture was not the one recorded next."""
     fps: float = field(default=25.0)
@@ -100,16 +106,28 @@ class TexturedFace:
     Each frame takes a background from the speaker's video, with the head as it was there, and a training picture whose
     shape is near the wanted one. The training picture is warped so that its points come to lie where the wanted
     shape has them, on the background's head, and faded in over the ring around the points. Its brightness is
-    matched to the background's, since light and camera drift between clips.
+    matched to the background's, since light and camera drift between clips. Where the next training picture is not the one
+    that was recorded next, both are shown for a moment, one fading into the other. Where the lips are known, what is between
+    them is drawn apart, see `interior`.
     """
 
-    def __init__(self, speaker: Speaker, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self,
+        speaker: Speaker,
+        device: str | torch.device = "cpu",
+        *,
+        jump_weight: float = JUMP_WEIGHT,
+        fade_s: float = FADE_S,
+    ) -> None:
         self.speaker = speaker
+        self.jump_weight, self.fade = jump_weight, round(fade_s * speaker.fps)
         self.device = torch.device(device)
-        self.mesh: Mesh = ringed_mesh(speaker.shapes.mean(axis=0))
+        self.mesh: Mesh = mesh_without_folds(speaker.shapes, speaker.inner_lips)
         self.height, self.width = speaker.backgrounds.shape[1:3]
         self._opacity = torch.from_numpy(self.mesh.opacity).float().to(self.device)
         self._looks = speaker.looks
+        self._sources = self.mesh.unfolded(self.mesh.vertices(speaker.shapes))
+        self._interior = Interior(speaker) if speaker.knows_lips else None
 
     def draw(
         self,
@@ -122,50 +140,84 @@ class TexturedFace:
         if len(shapes) != len(background):
             raise FacesynthError(f"every shape needs a background; got {len(shapes)} shapes and {len(background)} backgrounds")
         sources = self.choose(shapes, choice)
-        following = (np.diff(sources) == 0) | ((np.diff(sources) == 1) & ~self.speaker.clip_starts[sources[1:]])
+        following = self._following(sources)
         report.jumps, report.fps = int((~following).sum()), self.speaker.fps
+        before, share = self._fades(sources, following)
         for first in range(0, len(shapes), BATCH):
             began = time.perf_counter()
             part = slice(first, first + BATCH)
-            pictures, folded = self._drawn(shapes[part], sources[part], background[part])
-            report.folded_triangles += folded
+            vertices = self.mesh.vertices(shapes[part])
+            drawn = self.mesh.unfolded(vertices)
+            report.relaxed_frames += int((drawn != vertices).any(axis=(1, 2)).sum())
+            report.folded_triangles += int(self.mesh.folded(drawn).sum())
+            pictures = self._drawn(drawn, shapes[part], sources[part], before[part], share[part], background[part])
             report.frames += len(pictures)
             report.seconds += time.perf_counter() - began
             yield from pictures
 
+    def _following(self, sources: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """[T - 1] whether the next picture is the same one, or the one recorded next."""
+        return (np.diff(sources) == 0) | ((np.diff(sources) == 1) & ~self.speaker.clip_starts[sources[1:]])
+
+    def _fades(self, sources: NDArray[np.int64], following: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """[T] the picture that the one before a jump would have gone on to, and [T] how much of it is still seen."""
+        before, share = sources.copy(), np.zeros(len(sources))
+        for jump in np.flatnonzero(~following) + 1:
+            old = sources[jump - 1]
+            for k in range(min(self.fade, len(sources) - jump)):
+                onward = min(old + k + 1, len(self.speaker.shapes) - 1)
+                old_goes_on = not self.speaker.clip_starts[old + 1 : onward + 1].any()
+                before[jump + k] = onward if old_goes_on else before[jump + k - 1] if k else old
+                share[jump + k] = 1 - (k + 1) / (self.fade + 1)
+        return before, share
+
     def choose(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
         """[T] number of the training picture for each shape."""
+        wanted, known = self.speaker.compared(shapes), self.speaker.compared(self.speaker.shapes)
         if choice == "nearest":
-            return nearest(shapes, self.speaker.shapes)
-        return coherent(shapes, self.speaker.shapes, self._looks, self.speaker.clip_starts)
+            return nearest(wanted, known)
+        return coherent(wanted, known, self._looks, self.speaker.clip_starts, self.jump_weight)
 
     @torch.no_grad()
     def _drawn(
-        self, shapes: NDArray[np.float64], sources: NDArray[np.int64], background: NDArray[np.int64]
-    ) -> tuple[NDArray[np.uint8], int]:
-        target = self._on_head(self.speaker.background_head.at(background), shapes)
-        source = self._on_head(self.speaker.head.at(sources), self.speaker.shapes[sources]) - self.speaker.corner
-        folded = int(self.mesh.folded(target).sum())
+        self,
+        vertices: NDArray[np.float64],
+        shapes: NDArray[np.float64],
+        sources: NDArray[np.int64],
+        before: NDArray[np.int64],
+        share: NDArray[np.float64],
+        background: NDArray[np.int64],
+    ) -> NDArray[np.uint8]:
+        head = self.speaker.background_head.at(background)
+        target = head.to_picture(vertices)
         left, top, right, bottom = within(target, self.height, self.width)
         behind = self.speaker.backgrounds[background]
         box = torch.from_numpy(behind[:, top:bottom, left:right]).to(self.device).permute(0, 3, 1, 2).float()
-        pictures = torch.from_numpy(self.speaker.pictures[sources]).to(self.device).permute(0, 3, 1, 2).float()
         warp = PiecewiseAffineWarp(torch.from_numpy(self.mesh.triangles), bottom - top, right - left).to(self.device)
-        corner = torch.tensor([left, top], device=self.device)
-        wanted = torch.from_numpy(target).float().to(self.device) - corner
+        wanted = torch.from_numpy(target).float().to(self.device) - torch.tensor([left, top], device=self.device)
+        warped, opacity = self._warped(warp, wanted, sources, box)
+        if (fading := np.flatnonzero(share)).size:
+            old, _ = self._warped(warp, wanted[fading], before[fading], box[fading])
+            kept = torch.from_numpy(share[fading]).float().to(self.device)[:, None, None, None]
+            warped[fading] += kept * (old - warped[fading])
+        blended = _over(box, warped, _smooth(opacity))
+        if self._interior is not None:
+            blended = self._interior.over(blended, (left, top), head, shapes)
+        out = behind.copy()
+        out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()
+        return out
+
+    def _warped(
+        self, warp: PiecewiseAffineWarp, wanted: Tensor, sources: NDArray[np.int64], box: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Training pictures with their vertices at `wanted` [N, V, 2], as bright as `box` [N, 3, h, w]; and opacity [N, h, w]."""
+        pictures = torch.from_numpy(self.speaker.pictures[sources]).to(self.device).permute(0, 3, 1, 2).float()
+        source = self.speaker.head.at(sources).to_picture(self._sources[sources]) - self.speaker.corner
         there = torch.from_numpy(source).float().to(self.device)
         values = torch.cat([places_in(pictures, there), self._opacity.expand(len(wanted), -1)[:, :, None]], dim=2)
         drawn = warp.interpolate(wanted, values)
         opacity = drawn[..., 2].clamp(0, 1)
-        warped = sample(pictures, drawn[..., :2], "bicubic")
-        blended = _over(box, matched(warped, box, opacity), _smooth(opacity))
-        out = behind.copy()
-        out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()
-        return out, folded
-
-    def _on_head(self, head: HeadMaps, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Vertices [T, V, 2] px of head-fixed shapes [T, K, 2] on heads in a picture."""
-        return head.to_picture(self.mesh.vertices(shapes))
+        return matched(sample(pictures, drawn[..., :2], "bicubic"), box, opacity), opacity
 
 
 def matched(warped: Tensor, behind: Tensor, opacity: Tensor) -> Tensor:

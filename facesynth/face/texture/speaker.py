@@ -1,6 +1,6 @@
 """A speaker's pictures, each with its shape: what a textured face is drawn from, in one file."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
+from facesynth.face.texture.lips import Lips
 from facesynth.face.texture.mesh import ringed_mesh
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
@@ -15,6 +16,10 @@ from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16
 """Side of the little grey picture of the lower face by which pictures are compared."""
+OF_THE_MOUTH = ("inner_lips", "jaw")
+"""Arrays that files from before there were lips lack."""
+OPENING_WEIGHT = 10.0
+"""How much more than a point's place a distance of the lips counts where shapes are compared."""
 MARGIN_PX = 4
 """Around the ring of the mesh, so that bilinear sampling always has neighbours."""
 
@@ -43,6 +48,34 @@ class Speaker:
     """[M, 2] … where the head is in them."""
     fps: float
     """Hz, of the pictures."""
+    inner_lips: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Numbers of the points on the inner lips, the upper one with both corners, then the lower one back; none if unknown."""
+    jaw: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Numbers of the points that move with the jaw."""
+
+    @property
+    def knows_lips(self) -> bool:
+        """Whether it is known where the mouth opens, and how the jaw moves."""
+        return len(self.inner_lips) > 0 and len(self.jaw) > 1
+
+    def compared(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """[T, K', 2] by which shapes [T, K, 2] are compared: their points and, where the lips are known, how far these are open.
+
+        A mouth of another opening is not told by its points alone: of two hundred, few lie on the lips.
+        """
+        if not self.knows_lips:
+            return shapes
+        return np.concatenate([shapes, OPENING_WEIGHT * self.lips_apart(shapes)], axis=1)
+
+    def lips_apart(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """[T, U, 2] px how far the lips of shapes [T, K, 2] are apart, on a scale on which the first pixels count most.
+
+        With w a tenth of the mouth's width and d a distance: w log(1 + d / w). Shut lips are told from lips that hardly open.
+        """
+        scale = Lips.of(self.shapes, self.inner_lips).width / 10
+        lips = Lips.of(shapes, self.inner_lips)
+        across = lips.lower - lips.upper
+        return np.sign(across) * scale * np.log1p(np.abs(across) / scale)
 
     @property
     def head(self) -> HeadMaps:
@@ -70,14 +103,15 @@ class Speaker:
     def save(self, path: str | Path) -> None:
         """Write one compressed .npz, atomically."""
         with atomic_path(path) as part, open(part, "wb") as file:
-            np.savez_compressed(file, **{field.name: getattr(self, field.name) for field in fields(self)})
+            np.savez_compressed(file, **{known.name: getattr(self, known.name) for known in fields(self)})
 
     @classmethod
     def load(cls, path: str | Path) -> "Speaker":
         """Read what `save` wrote; FacesynthError for anything else."""
         if not Path(path).is_file():
             raise FacesynthError(f"{path}: no such file; it is made by `facesynth train` beside a model of followed points")
-        arrays: dict[str, Any] = read_arrays(path, "a file of the pictures of a speaker", [field.name for field in fields(cls)])
+        required = [known.name for known in fields(cls) if known.name not in OF_THE_MOUTH]
+        arrays: dict[str, Any] = read_arrays(path, "a file of the pictures of a speaker", required, OF_THE_MOUTH)
         speaker = cls(**{**arrays, "fps": float(arrays["fps"])})
         fault = _fault(speaker)
         if fault:
@@ -118,4 +152,12 @@ def _fault(speaker: Speaker) -> str:
         array = getattr(speaker, name)
         if array.shape != shape or not array.size or not np.isfinite(array).all():
             return f"{name} has shape {array.shape}, or is not finite"
+    for name in OF_THE_MOUTH:
+        numbers = getattr(speaker, name)
+        if (
+            numbers.ndim != 1
+            or numbers.dtype.kind != "i"
+            or (len(numbers) and not 0 <= numbers.min() <= numbers.max() < points[0])
+        ):
+            return f"{name} are no numbers of points"
     return ""

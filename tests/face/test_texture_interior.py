@@ -1,0 +1,130 @@
+"""Teeth between the lips of a synthetic face whose every pixel is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from facesynth.face.texture.compose import Report, TexturedFace
+from facesynth.face.texture.interior import Interior, jaw_maps
+from facesynth.face.texture.lips import Lips
+from facesynth.face.texture.speaker import Speaker, lower_face_window
+from facesynth.motion.planar import HeadMaps
+
+HEIGHT, WIDTH, MIDDLE = 100, 130, 50.0
+SKIN = 90.0
+ACROSS = np.linspace(45, 85, 9)
+OUTLINE = np.arange(16)
+"""Nine points of the upper lip with both corners, then seven of the lower one, back."""
+JAW = np.arange(16, 20)
+
+
+def shape(opening):
+    """[22, 2] the inner lips, the jaw, and two points of the cheeks, of a mouth that is open so far (px); the jaw does it."""
+    bow = 1 - ((ACROSS - 65) / 20) ** 2
+    upper = np.column_stack([ACROSS, MIDDLE - 1.0 * bow])
+    lower = np.column_stack([ACROSS, MIDDLE + 1.0 * bow + opening * bow])[-2:0:-1]
+    jaw = np.array([[50.0, 80], [60, 83], [70, 83], [80, 80]]) + np.array([0, opening])
+    return np.concatenate([upper, lower, jaw, [[35.0, 55], [95, 55]]])
+
+
+def upper_teeth(x, y):
+    return 150 + 40 * np.sin(x) * np.cos(0.4 * y)
+
+
+def lower_teeth(x, y):
+    return 120 + 40 * np.cos(0.8 * x + 0.3 * y)
+
+
+def picture(opening):
+    """[H, W, 3] skin; between the lips upper teeth that stand, and lower teeth that go with the jaw, meeting in the middle."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    depth, down = Lips.of(shape(opening)[None], OUTLINE).between(0, np.stack([x, y], axis=-1))
+    teeth = np.where(down < 0.5, upper_teeth(x, y), lower_teeth(x, y - opening))
+    return np.repeat(np.where(depth > 0, teeth, SKIN)[..., None], 3, axis=-1).round().astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def speaker():
+    openings = 9 + 7 * np.sin(np.arange(80) * 0.37)
+    shapes = np.stack([shape(opening) for opening in openings])
+    pictures = np.stack([picture(opening) for opening in openings])
+    linear, shift = np.tile(np.eye(2), (80, 1, 1)), np.zeros((80, 2))
+    left, top, right, bottom = lower_face_window(shapes, HeadMaps(linear, shift), HEIGHT, WIDTH)
+    cut = pictures[:, top:bottom, left:right]
+    behind, starts = pictures[:4], np.arange(80) % 40 == 0
+    corner = np.array([left, top])
+    return Speaker(cut, corner, shapes, linear, shift, starts, behind, linear[:4], shift[:4], 25.0, OUTLINE, JAW)
+
+
+def drawn_mouth(speaker, openings, head=None):
+    """[T, H, W] a plain skin with the interior of shapes, on a head that may be moved."""
+    shapes = np.stack([shape(opening) for opening in openings])
+    head = head or HeadMaps(np.tile(np.eye(2), (len(shapes), 1, 1)), np.zeros((len(shapes), 2)))
+    skin = torch.full((len(shapes), 3, HEIGHT, WIDTH), SKIN)
+    return Interior(speaker).over(skin, (0, 0), head, shapes).numpy()[:, 0]
+
+
+OPENINGS = (8.3, 11.2, 13.7)
+
+
+def test_upper_teeth_stand_while_the_mouth_opens(speaker):
+    x, y = np.meshgrid(np.arange(58, 73), [52, 53])
+    for drawn in drawn_mouth(speaker, OPENINGS):
+        assert np.abs(drawn[52:54, 58:73] - upper_teeth(x, y)).max() < 4
+
+
+def test_lower_teeth_go_with_the_jaw_and_are_not_stretched(speaker):
+    x, y = np.meshgrid(np.arange(60, 71), [47.0])
+    for drawn, opening in zip(drawn_mouth(speaker, OPENINGS), OPENINGS, strict=True):
+        rows = y + round(opening)
+        found = drawn[47 + round(opening), 60:71]
+        assert np.abs(found - lower_teeth(x, rows - opening)).max() < 4
+
+
+def test_they_move_with_the_head(speaker):
+    turned, shift = np.array([[[0.0, 1.0], [-1.0, 0.0]]]), np.array([[110.0, -10.0]])  # (x, y) -> (110 - y, x - 10)
+    plain = drawn_mouth(speaker, OPENINGS[:1])[0]
+    moved = drawn_mouth(speaker, OPENINGS[:1], HeadMaps(turned, shift))[0]
+    np.testing.assert_allclose(moved[48:63, 51:59], plain[52:60, 58:73].T[:, ::-1], atol=2.0)
+
+
+def test_nothing_appears_from_one_moment_to_the_next(speaker):
+    """A hundred times smaller a step of the shape makes a much smaller step of the picture: none comes in at once."""
+    coarse = drawn_mouth(speaker, [10.0, 11.0])
+    fine = drawn_mouth(speaker, np.linspace(10.0, 11.0, 101))
+    largest = np.abs(np.diff(fine, axis=0)).max()
+    assert largest < 0.1 * np.abs(np.diff(coarse, axis=0)).max()
+
+
+def test_shut_lips_show_no_interior(speaker):
+    assert np.array_equal(drawn_mouth(speaker, [-2.0])[0], np.full((HEIGHT, WIDTH), SKIN, np.float32))
+
+
+def test_the_face_draws_it_and_a_speaker_without_lips_does_not(speaker):
+    plain = replace(speaker, inner_lips=np.zeros(0, np.int64), jaw=np.zeros(0, np.int64))
+    shapes, background = np.stack([shape(11.2)]), np.array([0])
+    here, there = (next(TexturedFace(some).draw(shapes, background, Report())).astype(float) for some in (speaker, plain))
+    x, y = np.meshgrid(np.arange(58, 73), [52, 53])
+    errors = [np.abs(drawn[52:54, 58:73, 0] - upper_teeth(x, y)).mean() for drawn in (here, there)]
+    assert errors[0] < 8
+    assert not plain.knows_lips
+
+
+def test_the_jaw_is_rigid():
+    rng = np.random.default_rng(0)
+    rest, angle = rng.normal(scale=20, size=(5, 2)), 0.2
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    found = jaw_maps(np.stack([rest @ turn + [3, 7], 1.5 * rest]), rest)
+    np.testing.assert_allclose(found.linear[0], turn, atol=1e-12)
+    np.testing.assert_allclose(found.shift[0], [3, 7], atol=1e-9)
+    np.testing.assert_allclose(found.linear[1] @ found.linear[1].T, np.eye(2), atol=1e-12)
+
+
+def test_a_speaker_keeps_its_lips(speaker, tmp_path):
+    speaker.save(tmp_path / "speaker.npz")
+    back = Speaker.load(tmp_path / "speaker.npz")
+    assert back.knows_lips
+    assert np.array_equal(back.inner_lips, OUTLINE)
+    assert np.array_equal(back.jaw, JAW)
