@@ -259,7 +259,7 @@ def test_help_does_not_load_torch():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(("method", "settings"), [("efase", ()), ("network", ("steps=40", "features=log_mel"))])
+@pytest.mark.parametrize(("method", "settings"), [("efase", ()), ("network", ("steps=20", "features=log_mel"))])
 def test_any_methods_motion_drives_the_real_face(studio, tmp_path, method, settings):
     """Trained and spoken by the same two commands as the linear dynamical system, with the same pictures."""
     folder, model = studio[0], tmp_path / f"{method}.safetensors"

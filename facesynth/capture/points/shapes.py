@@ -33,7 +33,7 @@ class Shapes:
 
     def joined(self, others: Points) -> "Shapes":
         """With other points [T, L, 2] px of the same pictures behind them, on the same head."""
-        return Shapes(np.concatenate([self.points, self.head.to_head(others)], axis=1), self.head, self.fps)
+        return Shapes(np.concatenate([self.points, self.head.to_head(others.astype(np.float64))], axis=1), self.head, self.fps)
 
     def to_motion(self, layout: Layout) -> Motion:
         """As motion of landmarks; a layout's y points up."""

@@ -164,7 +164,7 @@ class TexturedFace:
         before, share = sources.copy(), np.zeros(len(sources))
         for jump in np.flatnonzero(~following) + 1:
             old = sources[jump - 1]
-            for k in range(min(self.fade, len(sources) - jump)):
+            for k in range(min(self.fade, len(sources) - int(jump))):
                 onward = min(old + k + 1, len(self.speaker.shapes) - 1)
                 old_goes_on = not self.speaker.clip_starts[old + 1 : onward + 1].any()
                 before[jump + k] = onward if old_goes_on else before[jump + k - 1] if k else old
