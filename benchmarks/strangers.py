@@ -51,7 +51,7 @@ SEARCHES: dict[str, tuple[Callable[[Network, Corpus], Any], Callable[[Any], tupl
     "anime graph soft": (soft_graph, lambda model: (model, model.in_metric)),
 }
 """How each is made, and where it keeps the network and in which coordinates it asks it."""
-PLAIN = ("viseme_table", "coarticulation", "efase", "anime_graph", "lds")
+PLAIN = ("viseme_table", "coarticulation", "efase", "anime_graph")
 HEADS = (
     "own lip error",
     "in speech, words known",
@@ -108,6 +108,8 @@ class Heard:
 def rows(learner: Learner) -> dict[str, Callable[[], Method]]:
     """What makes each row's model."""
     made: dict[str, Callable[[], Method]] = {name: lambda name=name: learner.method(name, {}) for name in PLAIN}
+    for hears in ("periodogram", *WIDTHS):
+        made[f"lds, {hears}"] = lambda hears=hears: learner.method("lds", {"hears": hears})
     for features in WIDTHS:
         for name in ("ridge", "tcn"):
             made[f"{name}, {features}"] = lambda name=name, features=features: learner.method(name, {"features": features})

@@ -5,9 +5,11 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.export.expectation import hearing_graphs
 from facesynth.export.folder import Content
 from facesynth.export.graph import Graph, Port
 from facesynth.graph_builder import Builder, power_spectrum
+from facesynth.inference.heard_input import ARRAYS
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE, STEP
 
@@ -15,14 +17,19 @@ from facesynth.speech.periodogram import COEFFICIENTS, FLOOR, RATE, STEP
 def lds_content(model: LDS) -> Content:
     """Everything that the runtime needs of a trained system."""
     return Content(
-        graphs=(features_graph(model), innovations_graph(model), rollout_graph(model)),
+        graphs=(*_hearing(model), innovations_graph(model), rollout_graph(model)),
         settings=asdict(model.settings),
         latency={
             "look_ahead_s": model.speaker().look_ahead_s,
             "about": "frame t is final when the sound up to t / fps + look_ahead_s is known; streaming equals the whole",
         },
         sample_rate=RATE,
+        arrays={} if model.heard is None else {f"heard_{name}": getattr(model.heard, name).cpu().numpy() for name in ARRAYS},
     )
+
+
+def _hearing(model: LDS) -> tuple[Graph, ...]:
+    return (features_graph(model),) if model.heard is None else hearing_graphs(model.heard.hearing)
 
 
 def features_graph(model: LDS) -> Graph:

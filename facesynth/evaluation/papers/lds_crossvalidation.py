@@ -122,7 +122,7 @@ def _judge(errors: Errors, name: str, model: LDS, train: Corpus, test: Corpus) -
 
 def _ridge(model: LDS, train: Corpus) -> Callable[[Utterance], Frames]:
     """Linear regression from the system's features of a frame to the frame."""
-    moments = Moments.zero(len(model.features.scale), train.layout.channels)
+    moments = Moments.zero(model.settings.features, train.layout.channels)
     for utterance in train:
         present = complete(utterance.motion.frames)
         heard = model.encode(utterance.speech, len(utterance.motion)).cpu().numpy()

@@ -32,9 +32,9 @@ def learned_input(
     require_change(np.concatenate(plain), "the sound")
     pca = Pca.fit(np.concatenate(plain), components)
     x = [_components(pca, piece, periodogram) for piece in pieces]
-    parts = _folds(pieces)
-    weights, others = _weights(x, shapes, parts)
-    inputs = [_apart(one, part, others) for one, part in zip(x, parts, strict=True)]
+    parts = folds_of(pieces)
+    weights, others = weights_of(x, shapes, parts)
+    inputs = [apart(one, part, others) for one, part in zip(x, parts, strict=True)]
     stacked = np.concatenate(inputs)
     scale = np.maximum(stacked.std(axis=0), 1e-6 * stacked.std(axis=0).max())
     return _encoder(pca, weights, scale, stacked), [one / scale for one in inputs]
@@ -46,7 +46,7 @@ def _components(pca: Pca, piece: Piece, periodogram: Periodogram) -> NDArray[np.
     return pca.encode(spectra.unflatten(-1, (periodogram.parts, COEFFICIENTS))).flatten(1).numpy()
 
 
-def _folds(pieces: list[Piece]) -> list[NDArray[np.int64]]:
+def folds_of(pieces: Sequence[Piece]) -> list[NDArray[np.int64]]:
     """[T] the fold of each frame: by sentence, or of a single sentence by time."""
     number = {sentence: i % FOLDS for i, sentence in enumerate(sorted({piece.sentence for piece in pieces}))}
     if len(number) > 1:
@@ -54,7 +54,7 @@ def _folds(pieces: list[Piece]) -> list[NDArray[np.int64]]:
     return [np.arange(len(piece.frames)) * FOLDS // len(piece.frames) for piece in pieces]
 
 
-def _weights(x: Sequence[Array], y: Sequence[Array], parts: Sequence[NDArray[np.int64]]) -> tuple[Array, list[Array]]:
+def weights_of(x: Sequence[Array], y: Sequence[Array], parts: Sequence[NDArray[np.int64]]) -> tuple[Array, list[Array]]:
     """Weights [S k, p] from everything, and from everything but each fold, with the penalty that predicts folds best."""
     sums = [Moments.zero(x[0].shape[1], y[0].shape[1]) for _ in range(FOLDS)]
     for one, shape, part in zip(x, y, parts, strict=True):
@@ -76,7 +76,7 @@ def _total(sums: Sequence[Moments]) -> Moments:
     return total
 
 
-def _apart(x: Array, part: NDArray[np.int64], others: Sequence[Array]) -> Array:
+def apart(x: Array, part: NDArray[np.int64], others: Sequence[Array]) -> Array:
     """[T, p] input of one piece, each frame's by the weights that were learned without its fold."""
     result = np.zeros((len(x), others[0].shape[1]))
     for fold in np.unique(part):

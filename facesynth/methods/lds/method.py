@@ -10,11 +10,12 @@ from facesynth.corpus import Corpus
 from facesynth.inference.arrays import Ints
 from facesynth.inference.closures import closing_direction
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.inference.lds import Lds, LdsSettings, LdsStream
+from facesynth.inference.lds import HeardLdsStream, Lds, LdsSettings, LdsStream
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
 from facesynth.inference.speech_state import STATES
 from facesynth.methods.lds.capabilities import CAPABILITIES
+from facesynth.methods.lds.heard_input import HeardRegression
 from facesynth.methods.lds.identification import REFITS, fitting_rows, identify
 from facesynth.methods.lds.innovations import Innovations, innovations_of
 from facesynth.methods.lds.learned_input import learned_input
@@ -23,12 +24,15 @@ from facesynth.methods.lds.recordings import Piece, Standardised, periodograms, 
 from facesynth.methods.lds.rollout import Rollout
 from facesynth.methods.lds.selection import Auto, choose_lead, choose_orders, plain
 from facesynth.methods.lds.system import Array, Clip, LinearSystem
+from facesynth.methods.learn.hearing import WIDTHS
 from facesynth.methods.method import Method
 from facesynth.methods.parts import part
 from facesynth.methods.registry import register
 from facesynth.speech.periodogram import RATE, Periodogram, Scale
 
 FITTED_TO = ("runs", "steps")
+PERIODOGRAM = "periodogram"
+Hears = Literal["periodogram", "log_mel", "phone_net", "both"]
 SETTLING_S = 4.0
 """How long the noise runs before the first frame, so that it starts as it goes on."""
 
@@ -39,6 +43,9 @@ class LDS(Method):
 
     Parameters
     ----------
+    hears : "periodogram", "log_mel", "phone_net" or "both"
+        What the input is learned from: the periodogram of the sound around a frame, or log-mel bands, a layer of the network
+        that hears phones, or both; `scale`, `context_ms`, `features` and `lead_ms` are of the periodogram.
     scale : "log" or "linear"
         Of the periodogram; the paper's is linear.
     context_ms : float
@@ -75,6 +82,7 @@ class LDS(Method):
     def __init__(
         self,
         *,
+        hears: Hears = "periodogram",
         scale: Scale = "log",
         context_ms: float = 200.0,
         features: float = 24,
@@ -92,6 +100,7 @@ class LDS(Method):
         _check(self.config)
         self.features, self.shape = Standardised.empty(), Standardised.empty()
         self.rollout, self.innovations = Rollout.empty(), Innovations.empty()
+        self.heard = None if hears == "periodogram" else HeardRegression(hears)
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from a corpus of any layout; `facts` holds what was chosen, the errors and the poles."""
@@ -103,7 +112,8 @@ class LDS(Method):
         sentences = [piece.sentence for piece in pieces]
 
         # A context has the sound before and after a frame in it: it needs no lead.
-        wanted_ms = 0.0 if self.config["context_ms"] and self.config["lead_ms"] == "auto" else self.config["lead_ms"]
+        around = self.config["context_ms"] or self.heard is not None
+        wanted_ms = 0.0 if around and self.config["lead_ms"] == "auto" else self.config["lead_ms"]
         lead = choose_lead(wanted_ms, lambda lead_ms: self._clips(pieces, lead_ms), sentences, self.config["rows"], weights)
         clips = self._clips(pieces, lead.chosen)
         rows = fitting_rows(clips, self.config["rows"])
@@ -144,7 +154,7 @@ class LDS(Method):
         """
         return self.speaker().synthesize(speech, seed=seed, noise=noise, **options)
 
-    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream:
+    def stream(self, *, seed: int = 0, noise: float = 1.0, sample_rate: int | None = None) -> LdsStream | HeardLdsStream:
         """Sound in pieces of any size, frames as soon as they are final; `sample_rate` must be that of the periodogram."""
         return self.speaker().stream(seed=seed, noise=noise, sample_rate=sample_rate)
 
@@ -159,12 +169,14 @@ class LDS(Method):
             features=part(self.features_of, device),
             innovations=part(lambda uniform: (self.innovations(uniform),), device),
             rollout=part(self.frames_of, device),
+            heard=None if self.heard is None else self.heard.input(self.fps),
         )
 
     @property
     def settings(self) -> LdsSettings:
         """Sizes and times of the trained system."""
-        features, components, states = len(self.features.scale), len(self.shape.scale), len(self.rollout.A)
+        components, states = len(self.shape.scale), len(self.rollout.A)
+        features = len(self.features.scale if self.heard is None else self.heard.bias)
         periodogram, amounts = self.periodogram, self.facts.get("noise_amounts", dict.fromkeys(STATES, 1.0))
         gap, along = self.facts.get("closed_gap"), self.facts.get("closing")
         closing = None if along is None else tuple(along)
@@ -193,19 +205,25 @@ class LDS(Method):
 
     def encode(self, speech: Speech, count: int) -> Tensor:
         """The system's input [count, m] for an utterance."""
+        if self.heard is not None:
+            return torch.from_numpy(self.heard.input(self.fps).at(self.heard.hearing.bands(speech), 0, count))
         return self.features.encode(self.periodogram.of(speech, count))
 
     def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
         shapes = [_encoded(self.shape, piece.frames) for piece in pieces]
+        inputs = self._inputs(pieces, shapes, lead_ms) if self.heard is None else self.heard.learn(pieces, shapes, self.fps)
+        clips = [Clip(u, y) for u, y in zip(inputs, shapes, strict=True)]
+        return [clip.centred() for clip in clips] if self.config["own_means"] else clips
+
+    def _inputs(self, pieces: list[Piece], shapes: list[Array], lead_ms: float) -> list[Array]:
+        """[T, m] of each piece, from its periodogram."""
         periodogram = Periodogram(self.fps, self.config["scale"], lead_ms, self.config["context_ms"])
         if periodogram.around:
             self.features, inputs = learned_input(pieces, shapes, periodogram, self.config["features"])
-        else:
-            sounds = periodograms(pieces, periodogram)
-            self.features = Standardised.fit(sounds, self.config["features"], "the sound")
-            inputs = [_encoded(self.features, sound) for sound in sounds]
-        clips = [Clip(u, y) for u, y in zip(inputs, shapes, strict=True)]
-        return [clip.centred() for clip in clips] if self.config["own_means"] else clips
+            return inputs
+        sounds = periodograms(pieces, periodogram)
+        self.features = Standardised.fit(sounds, self.config["features"], "the sound")
+        return [_encoded(self.features, sound) for sound in sounds]
 
     def _keep(self, system: LinearSystem, clips: list[Clip], rows: int, seed: int) -> None:
         rest = system.stochastic_output(tuple(clips))
@@ -235,6 +253,8 @@ def _check(config: dict[str, Any]) -> None:
         value, automatic = config[name], name != "rows"
         if not (automatic and value == "auto") and not (isinstance(value, int) and value >= 1):
             raise FacesynthError(f"{name} must be a whole number from 1{' or auto' if automatic else ''}; got {value!r}")
+    if config["hears"] not in (PERIODOGRAM, *WIDTHS):
+        raise unknown("what is heard", config["hears"], (PERIODOGRAM, *WIDTHS))
     if config["fitted_to"] not in FITTED_TO:
         raise unknown("fitted_to", config["fitted_to"], FITTED_TO)
     if config["lead_ms"] != "auto" and not isinstance(config["lead_ms"], int | float):
