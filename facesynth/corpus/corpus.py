@@ -29,6 +29,7 @@ from facesynth.corpus.utterance import Utterance
 from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
+from facesynth.inference.long_arrays import row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.inference.phones import PHONES, SILENCE
 from facesynth.inference.speech import Speech
@@ -340,7 +341,7 @@ class Corpus:
             raise FacesynthError(
                 f"the motion of {record.id!r} runs at {motion.fps:g} fps, the corpus at {self.fps:g}: resample it"
             )
-        if not len(motion) or np.isinf(motion.frames).any():
+        if not len(motion) or any(np.isinf(motion.frames[rows]).any() for rows in row_blocks(motion.frames)):
             raise FacesynthError(f"the motion of {record.id!r} is empty or holds infinite values")
 
     def _remember(self, record: Record) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Collection, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from facesynth.corpus.npz import read_npz
 from facesynth.corpus.record import Record
 from facesynth.corpus.utterance import Utterance
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.long_arrays import row_blocks
+from facesynth.inference.long_arrays import joined, row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.inference.npz import write_arrays
 from facesynth.inference.speech import EmotionTrack, Speech
@@ -122,7 +123,7 @@ def fit_length(signal: NDArray[np.float32], frames: int, fps: float) -> NDArray[
     held = min(lacking, int(LONGEST_S * fps))
     tail = np.full((lacking, signal.shape[1]), np.nan, np.float32)
     tail[:held] = signal[-1]
-    return np.concatenate([signal, tail])
+    return joined(chain((signal[rows] for rows in row_blocks(signal)), [tail]))
 
 
 def hash_signals(audio: NDArray[np.float32], sample_rate: int, motion: Motion) -> str:

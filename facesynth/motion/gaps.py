@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.long_arrays import by_blocks, row_blocks
+from facesynth.inference.long_arrays import by_blocks, joined, row_blocks
 from facesynth.inference.motion import Motion
 
 LONGEST_S = 0.1
@@ -93,7 +93,7 @@ def missing_in(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     return np.asarray(np.isnan(values).any(axis=-1))
 
 
-LOOKED_AT = 4096
+LOOKED_AT = 1024
 """Frames of a long recording that tell where the body is."""
 FAR = 10.0
 """A point further from the middle of all than this many times their usual distance is no place on the same body."""
@@ -105,7 +105,8 @@ def filled_in(points: NDArray[np.floating]) -> NDArray[np.bool_]:
     Such numbers (-16512, 9999.999, 99999, …) stand in all three coordinates, or in one; a marker at exactly three zeros,
     or metres from the face, there is none.
     """
-    some = points[:: max(1, len(points) // LOOKED_AT)]
+    step = max(1, len(points) // LOOKED_AT)
+    some = joined((points[rows][-rows.start % step :: step] for rows in row_blocks(points)), points.dtype)
     present = np.isfinite(some).all(axis=2) & ~_zeros(some)
     likely = some[present & ~_alike(some)]
     if len(likely) < 3:
