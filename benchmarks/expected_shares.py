@@ -109,9 +109,10 @@ def join(folder: Path) -> None:
             print(
                 f"| {share:g} | " + " | ".join(f"{row[k]:.3f} ({row[k + 1]:.2f})" for row in (own, other) for k in (0, 2)) + " |"
             )
-        best = choosing[:, :, 0].argmin(axis=1)
-        chosen = tested[np.arange(len(folds)), best, 0].mean()
-        print(f"each fold's own choice ({', '.join(f'{shares[k]:g}' for k in best)}): {chosen:.3f}")
+        for k, how in ((0, "as it comes"), (2, "sharpened")):
+            best = choosing[:, :, k].argmin(axis=1)
+            chosen = tested[np.arange(len(folds)), best, k].mean()
+            print(f"each fold's own choice, {how} ({', '.join(f'{shares[b]:g}' for b in best)}): {chosen:.3f}")
 
 
 if __name__ == "__main__":

@@ -80,7 +80,12 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
     residual.learn(rest)
     beside = residual.motion(corpus.fps, 1.0)
     assert beside is not None
-    makers = {"network": lambda net, _: net, "eFASE soft": soft_efase, "anime graph soft": soft_graph}
+    makers = {
+        "network": lambda net, _: net,
+        "eFASE soft": soft_efase,
+        "its search alone": search_alone,
+        "anime graph soft": soft_graph,
+    }
     for name, make in list(makers.items())[: 2 if options.clips else None]:
         if f"{name}, lips sharpened, residual" in judge.rows:
             continue
@@ -137,6 +142,11 @@ def soft_efase(network: Network, learned: Corpus) -> Efase:
     model.audio.predictor = deepcopy(network.predictor)
     model.audio.predictor.answer_in(model.pca.encode)
     return model.with_weights(**expecting)
+
+
+def search_alone(network: Network, learned: Corpus) -> Efase:
+    """The same, none of what is shown being the expected pose."""
+    return soft_efase(network, learned).with_weights(expected_share=0.0)
 
 
 def soft_graph(network: Network, learned: Corpus) -> AnimeGraph:

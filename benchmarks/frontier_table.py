@@ -97,6 +97,8 @@ def figures(motion: Motion, utterance: Utterance, threshold: float) -> list[floa
             rates.append(rate(motion, phones, threshold))
         except UnavailableError:
             rates.append(np.nan)
+    if not np.isfinite(motion.frames).all():  # the recording itself, which has gaps
+        return [np.nan, np.nan, np.nan, *rates]
     return [lve(motion, truth), energy_ratio(motion, truth), lips_energy(motion, truth), *rates]
 
 
