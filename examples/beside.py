@@ -1,7 +1,7 @@
 """The real face of a model of followed points, beside what the camera saw of an utterance that it did not learn from.
 
     facesynth corpus add actor/ clips/*.mpg --points --text-file lines.csv
-    python examples/beside.py actor/ ID -o beside.mp4 [--pictures folder/] [--noise 1]
+    python examples/beside.py actor/ ID -o beside.mp4 [--pictures folder/] [--method efase]
 
 Learns from every other utterance of the corpus, speaks the sound of this one, and writes the drawn video on the left, the
 recorded one on the right.
@@ -19,7 +19,7 @@ from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos
 from facesynth.face.draw.video import write_video
 from facesynth.face.texture.compose import Report
-from facesynth.methods.lds.method import LDS
+from facesynth.methods.registry import create
 from facesynth.stage.likeness import likeness
 from facesynth.stage.speaker_pictures import speaker_of
 
@@ -31,14 +31,16 @@ def main() -> None:
     others = corpus.subset([name for name in corpus.ids if corpus[name].sentence != utterance.sentence])
     real = read_footage(kept_videos(corpus)[utterance.id]).frames
 
-    model, speaker = LDS().fit(others), speaker_of(others)
-    motion = model.synthesize(utterance.speech, seed=options.seed, noise=options.noise)
+    model, speaker = create(options.method).fit(others), speaker_of(others)
+    own = {} if options.noise is None else {"noise": options.noise}
+    motion = model.synthesize(utterance.speech, seed=options.seed, **own)
     report = Report()
     pairs = list(beside(likeness(motion, speaker, report, options.choice), real))
 
     write_video(options.output, pairs, speaker.fps, utterance.speech.audio, utterance.speech.sample_rate)
     save_pictures(pairs, options.pictures)
-    error = np.sqrt(np.mean((motion.frames - utterance.motion.frames) ** 2))
+    count = min(len(motion), len(utterance.motion))
+    error = np.sqrt(np.mean((motion.frames[:count] - utterance.motion.frames[:count]) ** 2))
     print(
         f"{options.output}: {report.frames} pictures, {report.folded_triangles} folded triangles, {report.jumps} jumps between "
         f"recorded pictures, real-time factor {report.real_time_factor:.2f}; RMS error of the points {error:.2f} px"
@@ -69,7 +71,8 @@ def parse() -> argparse.Namespace:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--pictures", type=Path, help="folder for the single pictures (PNG)")
     parser.add_argument("--choice", choices=["coherent", "nearest"], default="coherent")
-    parser.add_argument("--noise", type=float, default=1.0)
+    parser.add_argument("--method", default="lds", help="lds, efase, anime_graph, network, …")
+    parser.add_argument("--noise", type=float, help="how much of it, of methods that draw some")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from facesynth.face.texture.compose import Report, TexturedFace
-from facesynth.face.texture.interior import Interior, jaw_maps
+from facesynth.face.texture.interior import Interior, Sources, jaw_maps
 from facesynth.face.texture.lips import Lips
 from facesynth.face.texture.speaker import Speaker, lower_face_window
 from facesynth.motion.planar import HeadMaps
@@ -128,3 +128,17 @@ def test_a_speaker_keeps_its_lips(speaker, tmp_path):
     assert back.knows_lips
     assert np.array_equal(back.inner_lips, OUTLINE)
     assert np.array_equal(back.jaw, JAW)
+
+
+def test_the_interior_is_that_of_the_pictures_drawn_from_and_fades_between_them(speaker):
+    """Two pictures of one shape, in one of which the teeth are dark: which is seen is said by the sources, half and half too."""
+    dark, same = speaker.pictures.copy(), speaker.shapes.copy()
+    dark[47], same[47] = 30, same[7]
+    interior = Interior(replace(speaker, pictures=dark, shapes=same))
+    shapes = np.repeat(speaker.shapes[7][None], 3, axis=0)
+    sources = Sources(np.array([7, 47, 47]), np.array([7, 47, 7]), np.array([0.0, 0.0, 0.5]))
+    head = HeadMaps(np.tile(np.eye(2), (3, 1, 1)), np.zeros((3, 2)))
+    skin = torch.full((3, 3, HEIGHT, WIDTH), SKIN)
+    light, black, half = interior.over(skin, (0, 0), head, shapes, sources).numpy()[:, 0, 52:54, 58:73]
+    assert light.mean() > black.mean() + 40
+    np.testing.assert_allclose(half, (light + black) / 2, atol=0.05 * (light.mean() - black.mean()) + 1)

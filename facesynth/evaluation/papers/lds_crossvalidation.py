@@ -67,7 +67,7 @@ def cross_validate(corpus: Corpus, configs: Mapping[str, Mapping[str, Any]], fol
 
 def judge_fold(errors: Errors, configs: Mapping[str, Mapping[str, Any]], train: Corpus, test: Corpus, seed: int = 0) -> None:
     """What `cross_validate` does with one fold, added to `errors`."""
-    mean, mel = create("mean_face").fit(train), create("ridge").fit(train, seed=seed)
+    mean, mel = create("mean_face").fit(train), create("ridge", features="log_mel").fit(train, seed=seed)
     for utterance in test:
         errors.add("mean shape", _frames(mean.synthesize(utterance.speech)), _frames(utterance.motion))
         errors.add("ridge, log-mel", _frames(mel.synthesize(utterance.speech)), _frames(utterance.motion))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from facesynth.face.texture.interior import Interior
+from facesynth.face.texture.interior import Interior, Sources
 from facesynth.face.texture.mesh import Mesh, mesh_without_folds
 from facesynth.face.texture.speaker import Speaker, within
 from facesynth.face.texture.warp import PiecewiseAffineWarp, places_in, sample
@@ -142,7 +142,7 @@ class TexturedFace:
         sources = self.choose(shapes, choice)
         following = self._following(sources)
         report.jumps, report.fps = int((~following).sum()), self.speaker.fps
-        before, share = self._fades(sources, following)
+        drawn_from = self._fades(sources, following)
         for first in range(0, len(shapes), BATCH):
             began = time.perf_counter()
             part = slice(first, first + BATCH)
@@ -150,7 +150,7 @@ class TexturedFace:
             drawn = self.mesh.unfolded(vertices)
             report.relaxed_frames += int((drawn != vertices).any(axis=(1, 2)).sum())
             report.folded_triangles += int(self.mesh.folded(drawn).sum())
-            pictures = self._drawn(drawn, shapes[part], sources[part], before[part], share[part], background[part])
+            pictures = self._drawn(drawn, shapes[part], drawn_from.at(part), background[part])
             report.frames += len(pictures)
             report.seconds += time.perf_counter() - began
             yield from pictures
@@ -159,8 +159,8 @@ class TexturedFace:
         """[T - 1] whether the next picture is the same one, or the one recorded next."""
         return (np.diff(sources) == 0) | ((np.diff(sources) == 1) & ~self.speaker.clip_starts[sources[1:]])
 
-    def _fades(self, sources: NDArray[np.int64], following: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """[T] the picture that the one before a jump would have gone on to, and [T] how much of it is still seen."""
+    def _fades(self, sources: NDArray[np.int64], following: NDArray[np.bool_]) -> Sources:
+        """Pictures `sources` [T], those that the ones before jumps would have gone on to, and how much of these is still seen."""
         before, share = sources.copy(), np.zeros(len(sources))
         for jump in np.flatnonzero(~following) + 1:
             old = sources[jump - 1]
@@ -169,7 +169,7 @@ class TexturedFace:
                 old_goes_on = not self.speaker.clip_starts[old + 1 : onward + 1].any()
                 before[jump + k] = onward if old_goes_on else before[jump + k - 1] if k else old
                 share[jump + k] = 1 - (k + 1) / (self.fade + 1)
-        return before, share
+        return Sources(sources, before, share)
 
     def choose(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
         """[T] number of the training picture for each shape."""
@@ -183,9 +183,7 @@ class TexturedFace:
         self,
         vertices: NDArray[np.float64],
         shapes: NDArray[np.float64],
-        sources: NDArray[np.int64],
-        before: NDArray[np.int64],
-        share: NDArray[np.float64],
+        sources: Sources,
         background: NDArray[np.int64],
     ) -> NDArray[np.uint8]:
         head = self.speaker.background_head.at(background)
@@ -195,14 +193,14 @@ class TexturedFace:
         box = torch.from_numpy(behind[:, top:bottom, left:right]).to(self.device).permute(0, 3, 1, 2).float()
         warp = PiecewiseAffineWarp(torch.from_numpy(self.mesh.triangles), bottom - top, right - left).to(self.device)
         wanted = torch.from_numpy(target).float().to(self.device) - torch.tensor([left, top], device=self.device)
-        warped, opacity = self._warped(warp, wanted, sources, box)
-        if (fading := np.flatnonzero(share)).size:
-            old, _ = self._warped(warp, wanted[fading], before[fading], box[fading])
-            kept = torch.from_numpy(share[fading]).float().to(self.device)[:, None, None, None]
+        warped, opacity = self._warped(warp, wanted, sources.now, box)
+        if (fading := np.flatnonzero(sources.fading)).size:
+            old, _ = self._warped(warp, wanted[fading], sources.before[fading], box[fading])
+            kept = torch.from_numpy(sources.fading[fading]).float().to(self.device)[:, None, None, None]
             warped[fading] += kept * (old - warped[fading])
         blended = _over(box, warped, _smooth(opacity))
         if self._interior is not None:
-            blended = self._interior.over(blended, (left, top), head, shapes)
+            blended = self._interior.over(blended, (left, top), head, shapes, sources)
         out = behind.copy()
         out[:, top:bottom, left:right] = blended.clamp(0, 255).round().byte().permute(0, 2, 3, 1).cpu().numpy()
         return out

@@ -2,9 +2,10 @@
 
 A warp by the points of the lips would stretch teeth as if they were skin, and a change of training pictures would let them
 blink. So the interior is read from training pictures twice, once standing as the head stands and once moving rigidly as
-the jaw does, and is the mean over the pictures whose lips are nearest to the wanted ones. A picture comes into the mean with
-no weight and grows with it, so that nothing appears from one frame to the next. Between the lips the upper half is taken from
-the first reading and the lower half from the second.
+the jaw does; between the lips the upper half is taken from the first reading and the lower half from the second. It comes from
+the pictures that the skin is drawn from, while they fade into each other from both. What their lips hide, and the wanted ones
+do not, is the mean over the pictures whose lips are nearest to the wanted ones: one comes into the mean with no weight and
+grows with it, so that nothing appears from one frame to the next.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,9 @@ from facesynth.motion.planar import HeadMaps
 MOST_PICTURES = 1500
 """So many training pictures, taken evenly, are read at most."""
 AVERAGED = 12
-"""Nearest pictures that an interior is the mean of; the last of them has no weight."""
+"""Nearest pictures whose mean shows what a picture's own lips hide; the last of them has no weight."""
+OF_OTHERS = 0.03
+"""Weight of that mean, of the picture's own; where this one shows nothing, the mean is all."""
 PER_PX = 2
 """Samples of the interior for each pixel, so that pictures that are put together stay sharp."""
 MARGIN_PX = 3.0
@@ -51,12 +54,28 @@ def jaw_maps(jaw: Floats, rest: Floats) -> HeadMaps:
     return HeadMaps(linear, np.stack([b.real, b.imag], axis=-1))
 
 
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """The training pictures that B frames are drawn from."""
+
+    now: NDArray[np.int64]
+    """[B]"""
+    before: NDArray[np.int64]
+    """[B] what is still seen of the picture that was jumped from …"""
+    fading: Floats
+    """[B] … by this share."""
+
+    def at(self, part: slice) -> "Sources":
+        """Those of some frames."""
+        return Sources(self.now[part], self.before[part], self.fading[part])
+
+
 class Interior:
     """Draws what is between the lips of one speaker."""
 
     def __init__(self, speaker: Speaker) -> None:
         places = np.unique(np.linspace(0, len(speaker.shapes) - 1, MOST_PICTURES).round().astype(int))
-        shapes = speaker.shapes[places]
+        shapes, self._read = speaker.shapes[places], places
         self._speaker, self._outline, self._jaw = speaker, speaker.inner_lips, speaker.jaw
         self._rest = shapes[:, self._jaw].mean(axis=0)
         self._known = cKDTree(self._lookup(shapes))
@@ -68,10 +87,18 @@ class Interior:
         self._of_skull = _Layer.read(speaker, places, everywhere, HeadMaps(_units(jaw), 0 * jaw.shift), lips, gains)
         self._of_jaw = _Layer.read(speaker, places, jaw.to_head(everywhere), jaw, lips, gains)
 
-    def over(self, picture: Tensor, corner: tuple[int, int], head: HeadMaps, shapes: Floats) -> Tensor:
-        """Pictures [B, 3, h, w], whose first pixel is at `corner` (x, y), with the interior of shapes [B, K, 2] on heads [B]."""
+    def over(
+        self, picture: Tensor, corner: tuple[int, int], head: HeadMaps, shapes: Floats, sources: "Sources | None" = None
+    ) -> Tensor:
+        """Pictures [B, 3, h, w], whose first pixel is at `corner` (x, y), with the interior of shapes [B, K, 2] on heads [B].
+
+        Without `sources` it is the mean of the nearest pictures alone.
+        """
         lips, jaw = Lips.of(shapes, self._outline), jaw_maps(shapes[:, self._jaw], self._rest)
         weights, chosen = self._weights(shapes)
+        if sources is not None:
+            weights = np.column_stack([1 - sources.fading, sources.fading, OF_OTHERS * weights])
+            chosen = np.column_stack([self._place(sources.now), self._place(sources.before), chosen])
         height, width = picture.shape[-2:]
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(1, -1, 2) + np.array(corner)
         places = head.to_head(np.broadcast_to(pixels.astype(np.float64), (len(shapes), *pixels.shape[1:])))
@@ -84,6 +111,10 @@ class Interior:
         share, colours = (torch.from_numpy(a).to(picture) for a in (opacity[:, None], inside.swapaxes(1, 2)))
         flat = picture.flatten(2)
         return (flat + share * (colours - flat)).reshape(picture.shape)
+
+    def _place(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Where pictures of the speaker are among those that were read: the nearest of these."""
+        return np.abs(numbers[:, None] - self._read).argmin(axis=1)
 
     def _lookup(self, shapes: Floats) -> Floats:
         """[T, Q] by which shapes are compared: the form of the mouth, its height most, and where the jaw is."""
@@ -147,7 +178,7 @@ class _Layer:
     def _mean_of(self, weights: Floats, chosen: NDArray[np.int64]) -> Floats:
         share = weights[:, None, None] * self.seen[chosen] / 255 + 0.0
         total = np.einsum("ahw,achw->chw", share, self.colours[chosen].astype(np.float64))
-        lacking = 0.02
+        lacking = 0.1 * OF_OTHERS
         return np.asarray((total + lacking * self.mean) / (share.sum(axis=0) + lacking))
 
 
