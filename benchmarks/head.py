@@ -5,7 +5,7 @@ python benchmarks/head.py CORPUS [--parts 5] [--folds 5] [--limit 60] [--methods
 Every recording is left out once, a fifth at a time. `recorded elsewhere` is the head of another recording, which knows nothing
 of this sound: its distances of distributions are what chance leaves of a person, its distance what posture and moment make.
 --parts cuts recordings into parts of so many seconds, each of which counts as one. --model adds a row for a trained model of a
-head, such as one that `train/packaged_head.py` learned from other people.
+head: the packaged `head`, or one that `train/packaged_head.py` learned from other people.
 """
 
 import argparse
@@ -29,8 +29,9 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.learn.heads import mean_head, poses_of, with_head
-from facesynth.methods.registry import create, load
+from facesynth.methods.registry import create
 from facesynth.motion.resample import resample
+from facesynth.zoo.shelf import load
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAYOUT = Layout("curves", ("still",))
@@ -58,7 +59,7 @@ def main() -> None:
     parser.add_argument("--folds", type=int, default=5)
     parser.add_argument("--limit", type=int, default=60)
     parser.add_argument("--methods", default="")
-    parser.add_argument("--model", type=Path, action="append", default=[])
+    parser.add_argument("--model", action="append", default=[], help="a model of a head: its file, or a name")
     options = parser.parse_args()
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
@@ -68,7 +69,7 @@ def main() -> None:
         print(f"{corpus.performer}: {len(found)} recordings, {minutes:.1f} minutes, {corpus.fps:g} fps, {options.folds} folds\n")
         print(f"| {' | '.join(COLUMNS)} |\n|---|{'---:|' * (len(COLUMNS) - 1)}")
         chosen = [name.strip() for name in options.methods.split(",") if name.strip()]
-        for name, learn in (METHODS | {path.stem: trained(path) for path in options.model}).items():
+        for name, learn in (METHODS | {Path(model).stem: trained(model) for model in options.model}).items():
             if not chosen or any(one in name for one in chosen):
                 print(row(name, learn, corpus, found, options.folds), flush=True)
 
@@ -115,11 +116,11 @@ def zoo(method: str, config: str = "", *, keyed: bool = False) -> Learner:
     return learn
 
 
-def trained(path: Path) -> Learner:
+def trained(name: str) -> Learner:
     """A model that learned from others: its head moves about the mean of the talker's, whose posture it cannot know."""
 
     def learn(_: Corpus, train: list[Utterance]) -> Maker:
-        model, rest = load(path), mean_head(train)
+        model, rest = load(name), mean_head(train)
 
         def make(utterance: Utterance) -> NDArray:
             there = resample(model.synthesize(utterance.speech, seed=seed_of(utterance)), utterance.motion.fps).head
