@@ -25,6 +25,7 @@ from facesynth.inference.wav import FIRST_CHUNK, LONG, LONG_SIZE, find_samples
 from facesynth.packages import is_installed
 from facesynth.speech.containers import PRIMED, read_container, unstated_priming
 from facesynth.speech.one_channel import one_channel
+from facesynth.speech.stopped_recorders import AU, FORM, mended
 
 if TYPE_CHECKING:
     from torchaudio.transforms import Resample
@@ -217,9 +218,12 @@ def _blocks(file: Any) -> Iterator[NDArray[np.float32]]:
 
 
 def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, ...]]:
-    """The file, its header mended in memory where it is a WAV of which a recorder never wrote the size; and what was noticed."""
+    """The file, its header mended in memory where a recorder never wrote the size of the sound; and what was noticed."""
     head = stored.read(FIRST_CHUNK)
     stored.seek(0)
+    if head[:4] in (FORM, AU):
+        whole = mended(opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ)))
+        return (stored, ()) if whole is None else (BytesIO(whole[0]), (whole[1],))
     if head[:4] not in (b"RIFF", *LONG) or head[8:] != b"WAVE":
         return stored, ()
     content = opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ))
@@ -228,15 +232,15 @@ def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, .
         return stored, ()
     if found.cut_off and head[:4] not in LONG:
         return stored, (found.remark,)
-    mended = bytearray(content)
+    sized = bytearray(content)
     if head[:4] in LONG:
-        mended[:4] = b"RF64"  # libsndfile knows it by this name
-        struct.pack_into("<Q", mended, LONG_SIZE, found.stop - found.start)
-        struct.pack_into("<I", mended, found.start - 4, 0xFFFFFFFF)
+        sized[:4] = b"RF64"  # libsndfile knows it by this name
+        struct.pack_into("<Q", sized, LONG_SIZE, found.stop - found.start)
+        struct.pack_into("<I", sized, found.start - 4, 0xFFFFFFFF)
     else:
-        struct.pack_into("<I", mended, found.start - 4, found.stop - found.start)
-        struct.pack_into("<I", mended, 4, len(mended) - 8)
-    return BytesIO(mended), (found.remark,)
+        struct.pack_into("<I", sized, found.start - 4, found.stop - found.start)
+        struct.pack_into("<I", sized, 4, len(sized) - 8)
+    return BytesIO(sized), (found.remark,)
 
 
 def _priming(stored: BinaryIO, layer: str) -> int:

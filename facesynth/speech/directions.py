@@ -2,6 +2,8 @@
 
 import re
 
+from facesynth.speech.subtitles import without_subtitles
+
 _DIRECTIONS = (
     "laugh|chuckl|giggl|sigh|cough|sneez|sniff|sob|cry|cries|crying|gasp|groan|moan|yawn|breath|inhal|exhal|whisper|shout|"
     "scream|mumbl|mutter|music|applau|clap|cheer|silence|pause|beat|beep|noise|sound|static|inaudible|unintelligible|indistinct|"
@@ -18,8 +20,10 @@ def without_directions(text: str) -> tuple[str, tuple[str, ...]]:
     """A transcript with what is not said taken out, and what that was.
 
     Square, curly and angle brackets hold directions; round ones and asterisks do where a few words say how, such as `(laughs)`.
+    Times of subtitles and names of who speaks are left out as well.
     """
-    found: list[str] = []
+    text, of_subtitles = without_subtitles(text)
+    found = list(of_subtitles)
 
     def gone(match: re.Match[str]) -> str:
         marked = match[0]

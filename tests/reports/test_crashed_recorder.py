@@ -116,3 +116,41 @@ def test_corpus_and_speak_say_so(tmp_path, talker):
     assert "all 64000 to the end" in problem["what"]
     _, facts = bringing.spoken(talker, path, tmp_path, "--phones", tmp_path / "take.lab")
     assert any("all 64000 to the end" in remark for remark in facts["remarks"])
+
+
+def big_endian(path, stated, kind, subtype, channels=1):
+    """An AIFF or AU whose header states so many bytes of sound."""
+    soundfile.write(path, np.repeat(SOUND[:, None], channels, axis=1), RATE, format=kind, subtype=subtype)
+    content = bytearray(path.read_bytes())
+    if kind == "AU":
+        struct.pack_into(">I", content, 8, stated)
+    else:
+        struct.pack_into(">I", content, content.index(b"SSND") + 4, stated + 8 if stated else 0)
+        struct.pack_into(">I", content, content.index(b"COMM") + 10, stated // (channels * BYTES[subtype]))
+        struct.pack_into(">I", content, 4, 0)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("stated", [0, 1000])
+@pytest.mark.parametrize(("subtype", "channels"), [("PCM_16", 1), ("PCM_24", 2)])
+@pytest.mark.parametrize("kind", ["AIFF", "AU"])
+def test_aiff_and_au_are_read_to_the_end_and_told(tmp_path, kind, subtype, channels, stated):
+    whole = len(SOUND) * channels * BYTES[subtype]
+    sound = read_sound(big_endian(tmp_path / "a.aif", stated, kind, subtype, channels))
+    np.testing.assert_allclose(sound.audio, SOUND, atol=1e-4)
+    (remark,) = sound.remarks
+    assert f"all {whole} to the end of the file were read" in remark
+
+
+@pytest.mark.parametrize("kind", ["AIFF", "AU"])
+def test_aiff_and_au_that_are_whole_are_read_as_they_are(tmp_path, kind):
+    path = tmp_path / "a.aif"
+    soundfile.write(path, SOUND, RATE, format=kind, subtype="PCM_16")
+    assert read_sound(path).remarks == ()
+    if kind == "AIFF":  # a title behind the sound
+        content = bytearray(path.read_bytes()) + b"NAME" + struct.pack(">I", 4) + b"take"
+        struct.pack_into(">I", content, 4, len(content) - 8)
+        path.write_bytes(content)
+        sound = read_sound(path)
+        assert (len(sound.audio), sound.remarks) == (len(SOUND), ())
