@@ -264,8 +264,9 @@ class Efase:
         rest = self.parts.rest[[self._emotion_index(feeling) for feeling in feelings]]
         fps, smoothing = self.database_fps, self.settings.smoothing
         found = concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
-        share = 0.0 if plan.expected is None else self.settings.expected_share
-        return found if share == 0 else found + share * (plan.expected - found)
+        if plan.expected is None or self.settings.expected_share == 0:
+            return found
+        return found + self.settings.expected_share * (plan.expected - found)
 
     def _decoded(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         coordinates = self.coordinates(plan, labels, feelings, bounds)
