@@ -36,7 +36,7 @@ def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
     components = _causal(b, value, network.poses)
     if predictor.linear.learned:
         own, straight = b.constant(np.float32(1 - SHARE)), b.constant(np.float32(SHARE))
-        linear = _linear(b, heard.name, predictor.linear, predictor.ahead)
+        linear = _linear(b, heard.name, reading.width, predictor.linear, predictor.ahead)
         components = b.op("Add", b.op("Mul", components, own), b.op("Mul", linear, straight))
     poses = b.op("Transpose", components, perm=[0, 2, 1])
     value = b.op("Add", b.op("MatMul", poses, b.constant(predictor.into.cpu().numpy())), b.constant(predictor.onto.cpu().numpy()))
@@ -60,15 +60,20 @@ def hearing_graphs(hearing: Hearing) -> tuple[Graph, ...]:
     return log_mel + (() if hearing.features == "log_mel" else (phone_net_graph(int(hearing.layer)),))
 
 
-def _linear(b: Builder, heard: str, linear: LinearPath, ahead: int) -> str:
-    """[B, R, T] what a regression says of [B, T, W]; as `LinearPath.forward`."""
-    _, bands, count = linear.weight.shape
+def _linear(b: Builder, heard: str, width: int, linear: LinearPath, ahead: int) -> str:
+    """[B, R, T] what a regression says of [B, T, W], W the width; as `LinearPath.forward`."""
+    _, bands, places = linear.weight.shape
     split = b.op("Reshape", b.span(heard, 2, 0, EACH * bands), b.ints(0, 0, EACH, bands))
     sound = b.op("Transpose", b.op("ReduceMean", split, b.ints(2), keepdims=0), perm=[0, 2, 1])
     late = max(ahead - SIDE, 0)
-    padded = b.op("Pad", sound, b.ints(0, 0, count - 1 + late, 0, 0, 0), b.constant(np.float32(0)))
+    padded = b.op("Pad", sound, b.ints(0, 0, places - 1 + late, 0, 0, 0), b.constant(np.float32(0)))
     weight, bias = (b.constant(part.float().cpu().numpy()) for part in (linear.weight, linear.bias))
-    return b.span(b.op("Conv", padded, weight, bias), 2, 0, -late if late else 2**62)
+    found = b.span(b.op("Conv", padded, weight, bias), 2, 0, -late if late else 2**62)
+    if not (count := len(linear.emotions)):
+        return found
+    felt = b.op("Pad", b.span(heard, 2, width - count, width), b.ints(0, ahead, 0, 0, 0, 0), b.constant(np.float32(0)))
+    shifts = b.op("MatMul", b.span(felt, 1, 0, -ahead if ahead else 2**62), b.constant(linear.emotions.cpu().numpy()))
+    return b.op("Add", found, b.op("Transpose", shifts, perm=[0, 2, 1]))
 
 
 def _changed(b: Builder, value: str, block: CausalBlock) -> str:

@@ -59,6 +59,21 @@ def test_the_penalty_is_chosen_by_voices_that_were_not_met():
     assert heard_otherwise(1) < 0.1 * heard_otherwise(0)
 
 
+def test_each_emotion_has_poses_of_its_own():
+    """Poses that are a linear map of the sound and lie elsewhere in each of two emotions, half of a recording in either."""
+    reading = replace(READING, emotion_count=2)
+    weights = RNG.normal(size=(BANDS, 3)).astype(np.float32)
+    said = Said.numbered([0, 0], np.array([50 / FPS, np.inf]), [0, 1], 2)
+    lie = np.repeat([[5.0, 0, 0], [0, -7.0, 0]], 50, axis=0).astype(np.float32)
+    some = [replace(one, said=said, poses=one.poses + lie) for one in (recording(weights, 0) for _ in range(6))]
+    path, ahead = LinearPath(), 4
+    path.learn(some, reading, ahead)
+    told = reading.told(some[0].bands, said, np.arange(100 + ahead) / FPS)
+    found = path(torch.from_numpy(told), ahead)[ahead:].numpy()
+    inside = slice(2 * SIDE, -2 * SIDE)
+    np.testing.assert_allclose(found[inside], some[0].poses[inside], atol=0.15)
+
+
 def test_it_says_nothing_before_it_has_learned():
     assert not LinearPath().learned
 
