@@ -77,6 +77,14 @@ def test_a_network_that_hears_with_the_phone_network_speaks_from_its_folder(tmp_
     np.testing.assert_allclose(folder.synthesize(speech).frames, wanted, atol=1e-4 * np.abs(wanted).max())
 
 
+@needs_weights
+def test_the_same_seed_changes_sounds_alike_and_gives_the_same_file(tmp_path):
+    corpus = tiny_corpus(tmp_path / "corpus", utterances=3, fps=50)
+    for name in ("one", "two"):
+        Network(steps=2, features="phone_net", voices=1, unsaid=0.5).fit(corpus, seed=4).save(tmp_path / name)
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
 def test_a_share_that_is_none_is_refused():
     with pytest.raises(FacesynthError, match="unsaid"):
         Network(unsaid=1.5)
