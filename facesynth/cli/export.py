@@ -34,18 +34,21 @@ def export(
     """Write MODEL as a folder that runs without torch: ONNX graphs, arrays and a manifest.
 
     The words `features`, `phones` and `face` in place of a model's file write what is heard in sound, the network that hears
-    phones, and what moves the head.
+    phones, and what moves the head. The name of a model that comes with facesynth copies its folder, which is one already.
 
     Every graph is compared with facesynth at two batch sizes and two lengths. facesynth-runtime runs the folder.
     """
     from facesynth.export.models import export_model
     from facesynth.export.parts import export_face, export_features
     from facesynth.export.phones import export_phones
+    from facesynth.zoo.copying import copy_packaged, is_packaged
 
     kept: Any = weights
     parts = {"features": export_features, "phones": export_phones, "face": export_face}
     if only in (None, str(model)) and str(model) in parts:
         manifest = parts[str(model)](output, kept)
+    elif only is None and is_packaged(model):
+        manifest = copy_packaged(model, output, changed=weights != "float32" or beside is not None)
     else:
         manifest = export_model(model, output, kept, only=only, beside=None if beside is None else (beside, share))
     if "unknown" in (*manifest["training_data"]["licences"], *manifest["training_data"]["consents"]):

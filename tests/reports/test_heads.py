@@ -194,6 +194,8 @@ def test_a_head_with_all_of_arkit_needs_no_preset():
 
     assert fitting((*ARKIT_NAMES, "viseme_aa", "viseme_O", "viseme_U", "mouthOpen")) == ("", {})
     assert fitting(("one", "two", "three", "four")) == ("", {})
+    assert fitting(("LipsFunnel", "LipsPucker", "Wink", "Tongue_Long", "Ears_Back", "Hat"))[0] == "facs"
+    assert fitting(("A", "B", "C", "D", "E", "F", "G", "H")) == ("", {})
 
 
 FACESHIFT = """EyeBlink EyeSquint EyeDown EyeIn EyeOpen EyeOut EyeUp BrowsD BrowsU MouthFrown MouthSmile MouthDimple LipsStretch

@@ -16,6 +16,8 @@ ENOUGH = 15
 JAW = "jawOpen"
 FEWEST = 3
 """Channels that a preset must drive, or half of them all, to be chosen by itself."""
+FEWEST_ALONE, LETTERS = 2, 3
+"""The same of a head without any of ARKit's names, which nothing else would move; names so short may mean anything there."""
 
 
 def is_preset(mapping: str | Path) -> bool:
@@ -49,7 +51,8 @@ def fitting(channels: Sequence[str]) -> tuple[str, Mapping[str, Channel]]:
         ways = {name: _beside(taken, by_name) for name, taken in ways.items()}
     best = max(PRESETS, key=lambda name: (_opens(ways[name], by_name), len(_moved(ways[name]) | set(by_name))))
     added = len(_moved(ways[best]) - set(by_name))
-    fits = added >= FEWEST or 2 * added >= len(channels) > 0
+    alone = not by_name and sum(len(channel) > LETTERS for channel in _moved(ways[best])) >= FEWEST_ALONE
+    fits = alone or added >= FEWEST or 2 * added >= len(channels) > 0
     return (best, ways[best]) if fits else ("", {})
 
 
