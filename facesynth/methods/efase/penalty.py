@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from facesynth.inference.arrays import Ints
 from facesynth.inference.efase.costs import Weights
 from facesynth.inference.efase.nodes import Nodes
 from facesynth.inference.efase.steps import step_costs
@@ -15,18 +16,19 @@ def median_transition(nodes: Nodes, weights: Weights, seed: int = 0) -> float:
     PNT is stated as a multiple of it, which makes it independent of the motion's unit. 0 where the
     database has no such pair.
     """
+    i, j = alike_pairs(nodes, seed)
+    return float(np.median(step_costs(nodes, i, j, weights))) if len(i) else 0.0
+
+
+def alike_pairs(nodes: Nodes, seed: int = 0) -> tuple[Ints, Ints]:
+    """[n], [n] random pairs of nodes (i, j) between which a step is one of rule 2."""
     rng = np.random.default_rng(seed)
     followers = np.flatnonzero(nodes.before >= 0)
-    if not len(followers):
-        return 0.0
     pairs = []
-    for j in rng.choice(followers, PAIRS):
+    for j in rng.choice(followers, PAIRS) if len(followers) else ():
         p = nodes.before[j]
-        alike = np.flatnonzero(nodes.visemes == nodes.visemes[p])
-        i = int(rng.choice(alike))
+        i = int(rng.choice(np.flatnonzero(nodes.visemes == nodes.visemes[p])))
         if i != p:
             pairs.append((i, int(j)))
-    if not pairs:
-        return 0.0
-    i, j = np.array(pairs).T
-    return float(np.median(step_costs(nodes, i, j, weights)))
+    found = np.array(pairs, np.int64).reshape(-1, 2)
+    return found[:, 0], found[:, 1]

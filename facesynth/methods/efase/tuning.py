@@ -1,31 +1,33 @@
-"""Search of the cost's parameters on sentences that are not in the database (Deng 2006, §5.3.6).
+"""Search of the cost's parameters on sentences that are not in the database (Deng 2006, §5.3.6), of one corpus or of several.
 
 The error is piecewise constant in the parameters (the path changes or it does not), so there is no
 gradient: a tree-structured Parzen estimator (Optuna) over the logarithms of PNT and of the six weights, begun
-with the published ones. Trials are asked for in groups, so that what is found does not depend on the number of
-processes. Every evaluation is kept in a file; a search that was interrupted and is started again with the same
-seed asks for the same trials, takes from there what is done and goes on.
+with the published ones. What is found on one performer need not suit another, so several corpora are searched
+together: of each the error counts relative to that of the published parameters, as a geometric mean.
+
+Trials are asked for in groups, so that what is found does not depend on who evaluates them. Every evaluation is
+kept in a file; a search that was interrupted and is started again with the same seed asks for the same trials, takes
+from there what is done and goes on.
 """
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import optuna
-import torch
-from tqdm import tqdm
 
-from facesynth.corpus import Corpus, Record, Utterance
+from facesynth.corpus import Corpus, Record
+from facesynth.corpus.workers import ALONE, Workers, spread
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
-from facesynth.motion.resample import resample
+from facesynth.methods.efase.tuning_journal import TuningJournal
+from facesynth.methods.efase.tuning_search import ChangingSettings, Example, examples_of, sentence_errors
 
 RANGES: dict[str, tuple[float, float]] = {
     "penalty": (5.0, 100.0),
@@ -36,20 +38,52 @@ RANGES: dict[str, tuple[float, float]] = {
     "delta": (0.03, 3.0),
     "phi": (0.01, 1.0),
 }
-"""Where each setting of eFASE is looked for; all are searched by their logarithm."""
+"""Where each setting of the search is looked for; all are searched by their logarithm."""
+SOFT_RANGES: dict[str, tuple[float, float]] = {
+    "temperature": (0.03, 10.0),
+    "audio_weight": (0.03, 30.0),
+    "pose_weight": (0.03, 30.0),
+}
+"""The same of what the paper leaves at 0; searched where a model has it."""
 PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 """Deng 2006; PNT is ours, the dissertation gives none."""
 CROWD = 4
 """Trials of a group for each setting."""
 
 
-@dataclass(frozen=True, eq=False)
-class Example:
-    """A sentence to imitate, in the model's coordinates."""
+@dataclass(frozen=True)
+class Recordings:
+    """A corpus with a model of it that knows neither the sentences to tune on nor those to test on; as files, for any process."""
 
-    utterance: Utterance
-    truth: Floats
-    """[T, D] at the database's rate; NaN where the recording has a gap."""
+    corpus: Path
+    performer: str
+    model: Path
+    tuning: tuple[str, ...]
+    test: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One evaluation: some settings on some sentences of one corpus."""
+
+    settings: tuple[tuple[str, float], ...]
+    """Names and values; none: the model's own."""
+    of: Recordings
+    ids: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TestErrors:
+    """Mean errors of one corpus on sentences that nothing was chosen by, squared unit of its layout."""
+
+    performer: str
+    test_sentences: tuple[str, ...]
+    found: float
+    default: float
+    published: float
+    nearer: int
+    """Test sentences that the found settings are nearer in than the default ones."""
+    farther: int
 
 
 @dataclass(frozen=True)
@@ -57,13 +91,13 @@ class Tuning:
     """What a search found."""
 
     settings: dict[str, float]
-    error: float
-    """On the tuning sentences, mean over sentences, squared unit of the layout."""
+    ratio: float
+    """On the tuning sentences: error over that of the published settings, geometric mean over the corpora."""
     evaluations: int
-    tuning_sentences: tuple[str, ...]
-    test_sentences: tuple[str, ...]
-    test_error: float
-    published_test_error: float
+    tuning_sentences: tuple[tuple[str, ...], ...]
+    """Of each corpus."""
+    tested: tuple[TestErrors, ...]
+    """Of each corpus."""
 
 
 def split_for_tuning(corpus: Corpus, tuning: int, test: int, seed: int) -> tuple[Corpus, Corpus, Corpus]:
@@ -86,32 +120,51 @@ def split_for_tuning(corpus: Corpus, tuning: int, test: int, seed: int) -> tuple
     return corpus.subset(rest), corpus.subset(chosen[0]), corpus.subset(chosen[1])
 
 
-def tune(
-    model: Efase, tuning: Corpus, test: Corpus, *, journal: str | Path, generations: int = 10, seed: int = 0, workers: int = 1
+def tuned(
+    corpora: Sequence[Corpus],
+    *,
+    journal: Path,
+    sentences: int,
+    test_sentences: int,
+    generations: int,
+    limit: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    workers: Workers = ALONE,
 ) -> Tuning:
-    """Find settings for a model whose database holds neither `tuning` nor `test`.
+    """`tune` on held-out sentences of each corpus; a database is all others of it, or `limit` utterances, evenly chosen.
 
-    `generations` groups of CROWD × 7 trials follow the first one, which is drawn at random but for the published settings.
-    journal: a file of JSON lines, one for each evaluation, which makes the search resumable; it belongs to one model and seed.
+    settings: of `Efase`, where they are not its defaults; what they learn is left out, for it would choose the weights itself.
     """
-    kept = _Journal(Path(journal), {"seed": seed, "corpus": model.provenance.get("sha256"), "sentences": list(tuning.ids)})
-    group = CROWD * len(RANGES)
-    study = _study(seed, group)
-    with TemporaryDirectory() as folder, _Workers(model, tuning, kept, workers, group * (generations + 1), Path(folder)) as pool:
-        for _ in range(generations + 1):
-            trials = [study.ask() for _ in range(group)]
-            settings = [{name: trial.suggest_float(name, *RANGES[name], log=True) for name in RANGES} for trial in trials]
-            for trial, error in zip(trials, pool.errors_of(settings), strict=True):
-                study.tell(trial, error)
-    examples = examples_of(model, test)
+    with _models(corpora, sentences, test_sentences, limit, dict(settings or {}), seed, journal) as recordings:
+        return tune(recordings, journal=journal, generations=generations, seed=seed, workers=workers)
+
+
+def tune(
+    recordings: Sequence[Recordings], *, journal: str | Path, generations: int = 10, seed: int = 0, workers: Workers = ALONE
+) -> Tuning:
+    """Find settings that are nearest over all `recordings`.
+
+    `generations` groups of trials, CROWD for each setting, follow the first one, which is drawn at random but for the
+    published settings. journal: a file of JSON lines, one for each evaluation, which makes the search resumable; it belongs
+    to these models and this seed.
+    """
+    ranges = _ranges(_loaded(recordings[0].model))
+    kept = TuningJournal(Path(journal), _about(recordings, seed))
+    published = _errors(recordings, [PUBLISHED], kept, workers, "published settings")[0]
+    study = _study(seed, CROWD * len(ranges))
+    for group in range(generations + 1):
+        trials = [study.ask() for _ in range(CROWD * len(ranges))]
+        settings = [{name: trial.suggest_float(name, *ranges[name], log=True) for name in ranges} for trial in trials]
+        errors = _errors(recordings, settings, kept, workers, f"tuning, group {group + 1} of {generations + 1}")
+        for trial, row in zip(trials, errors, strict=True):
+            study.tell(trial, float(np.log(row / published).mean()))
     return Tuning(
         study.best_params,
-        float(study.best_value),
+        float(np.exp(study.best_value)),
         len(study.trials),
-        tuple(tuning.ids),
-        tuple(test.ids),
-        mean_error(model.with_weights(**study.best_params), examples),
-        mean_error(model.with_weights(**PUBLISHED), examples),
+        tuple(one.tuning for one in recordings),
+        tuple(_tested(recordings, study.best_params, workers)),
     )
 
 
@@ -123,129 +176,88 @@ def _study(seed: int, group: int) -> optuna.Study:
     return study
 
 
-def tuned(
-    corpus: Corpus,
-    *,
-    journal: Path,
-    sentences: int,
-    test_sentences: int,
-    generations: int,
-    limit: int | None = None,
-    seed: int = 0,
-    workers: int = 1,
-) -> Tuning:
-    """`tune` on held-out sentences of a corpus; the database is all others, or `limit` utterances, evenly chosen."""
-    database, tuning, test = split_for_tuning(corpus, sentences, test_sentences, seed)
-    if limit and len(database) > limit:
-        database = database.subset([database.ids[i * len(database) // limit] for i in range(limit)])
-    model = Efase().fit(database, seed=seed)
-    return tune(model, tuning, test, journal=journal, generations=generations, seed=seed, workers=workers)
+def _ranges(model: Efase) -> dict[str, tuple[float, float]]:
+    return RANGES | {name: limits for name, limits in SOFT_RANGES.items() if model.config[name] > 0}
 
 
-def examples_of(model: Efase, corpus: Corpus) -> list[Example]:
-    """The utterances of a corpus, ready to be compared with."""
-    fps = model.config["database_fps"]
-    motions = [(utterance, resample(utterance.motion, fps)) for utterance in corpus]
-    return [Example(u, model.pca.encode(torch.from_numpy(m.frames)).numpy().astype(np.float64)) for u, m in motions]
+def _about(recordings: Sequence[Recordings], seed: int) -> dict[str, Any]:
+    """What evaluations depend on beside the settings that are tried."""
+    models = [_loaded(one.model) for one in recordings]
+    return {
+        "seed": seed,
+        "corpora": [model.provenance.get("sha256") for model in models],
+        "models": [{key: value for key, value in model.config.items() if key not in RANGES} for model in models],
+        "sentences": [list(one.tuning) for one in recordings],
+    }
 
 
-def mean_error(model: Efase, examples: Iterable[Example]) -> float:
-    """Mean over sentences of eq. 13 of Deng 2008, in PCA space, where squared distances are those over markers."""
-    speaker, points = model.speaker, len(model.fitted_layout.names)
-    errors = []
-    for example in examples:
-        speech = example.utterance.speech
-        feelings, _ = speech.emotions.per_phone(speech.phones)
-        bounds = speech.phones.frame_bounds(speaker.database_fps)
-        made = speaker.coordinates(speaker.plan(speech), speech.phones.labels, feelings, bounds)
-        count = min(len(made), len(example.truth))
-        errors.append(np.nanmean(((made[:count] - example.truth[:count]) ** 2).sum(axis=1)) / points)
-    return float(np.mean(errors))
+def _errors(
+    recordings: Sequence[Recordings], settings: Sequence[Mapping[str, float]], kept: TuningJournal, workers: Workers, what: str
+) -> list[Floats]:
+    """[corpora] mean errors for each of the settings; what the journal knows is not computed again."""
+    rows = [tuple(one.items()) for one in settings]
+    missing = [(row, of) for row in dict.fromkeys(rows) for of in recordings if not kept.knows(row, of.performer)]
+    jobs = [Job(row, of, of.tuning) for row, of in missing]
+    for (row, of), errors in zip(missing, spread(errors_of, jobs, workers, what), strict=True):
+        kept.keep(row, of.performer, float(np.mean(errors)))
+    return [np.array([kept.error(row, of.performer) for of in recordings]) for row in rows]
+
+
+def _tested(recordings: Sequence[Recordings], found: Mapping[str, float], workers: Workers) -> Iterator[TestErrors]:
+    rows = (tuple(found.items()), (), tuple(PUBLISHED.items()))
+    jobs = [Job(row, of, of.test) for of in recordings for row in rows]
+    errors = list(spread(errors_of, jobs, workers, "test sentences"))
+    for number, of in enumerate(recordings):
+        mine, default, published = (np.array(row) for row in errors[3 * number : 3 * number + 3])
+        means = (float(row.mean()) for row in (mine, default, published))
+        yield TestErrors(of.performer, of.test, *means, int((mine < default).sum()), int((mine > default).sum()))
+
+
+@contextmanager
+def _models(
+    corpora: Sequence[Corpus], tuning: int, test: int, limit: int | None, settings: dict[str, Any], seed: int, journal: Path
+) -> Iterator[list[Recordings]]:
+    """A model of each corpus, beside the journal: where other machines see the journal, they see the models."""
+    names = [corpus.performer for corpus in corpora]
+    if len(set(names)) < len(names):
+        raise FacesynthError(f"each corpus must be of another performer; got {', '.join(names)}")
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=journal.parent, prefix="models-") as folder:
+        recordings = []
+        for number, corpus in enumerate(corpora):
+            database, *held_out = split_for_tuning(corpus, tuning, test, seed)
+            model = Efase.from_config({**settings, "learn": False, "maps": False, "residual": 0.0, "sharpening": 0.0})
+            path = Path(folder) / f"{number}.safetensors"
+            model.fit(_some_of(database, limit), seed=seed).save(path)
+            recordings.append(Recordings(corpus.path, corpus.performer, path, *(tuple(part.ids) for part in held_out)))
+        yield recordings
+
+
+def _some_of(corpus: Corpus, limit: int | None) -> Corpus:
+    if not limit or len(corpus) <= limit:
+        return corpus
+    return corpus.subset([corpus.ids[i * len(corpus) // limit] for i in range(limit)])
 
 
 def _in_order(corpus: Corpus, order: np.ndarray) -> Iterator[Record]:
     return (corpus.usable_records[i] for i in order)
 
 
-class _Journal:
-    """Errors by settings, in a file that only grows."""
-
-    def __init__(self, path: Path, about: dict[str, Any]) -> None:
-        self.path, self.errors = path, dict[str, float]()
-        if path.exists():
-            text = path.read_text(encoding="utf-8", errors="replace")
-            lines = text.splitlines()
-            if not lines or _complete(lines[0]) != about:
-                raise FacesynthError(f"{path} belongs to another search, or to none; give another file, or remove it")
-            self.errors = {row["key"]: row["error"] for row in map(_complete, lines[1:]) if {"key", "error"} <= row.keys()}
-            if not text.endswith("\n"):  # an interruption cut the last line
-                with path.open("a", encoding="utf-8") as file:
-                    file.write("\n")
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps(about) + "\n", encoding="utf-8")
-
-    def keep(self, key: str, error: float) -> None:
-        self.errors[key] = error
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"key": key, "error": error}) + "\n")
+@lru_cache(maxsize=8)
+def _loaded(model: Path) -> Efase:
+    return Efase.load(model)
 
 
-def _complete(line: str) -> dict[str, Any]:
-    """A line of the journal, or nothing for one that an interruption cut."""
-    try:
-        row = json.loads(line)
-    except ValueError:
-        return {}
-    return row if isinstance(row, dict) else {}
+@lru_cache(maxsize=8)
+def _changing(model: Path) -> ChangingSettings:
+    return ChangingSettings(_loaded(model))
 
 
-class _Workers:
-    """Evaluates populations, in processes where more than one is wanted; the result does not depend on their number."""
-
-    def __init__(self, model: Efase, corpus: Corpus, journal: _Journal, workers: int, total: int, folder: Path) -> None:
-        self.model, self.corpus, self.journal, self.workers, self.folder = model, corpus, journal, workers, folder
-        self.bar = tqdm(total=total, desc="tuning", disable=None, leave=False)
-        self.examples = examples_of(model, corpus) if workers == 1 else []
-        self.pool: ProcessPoolExecutor | None = None
-
-    def __enter__(self) -> "_Workers":
-        if self.workers > 1:
-            path = self.folder / "model.safetensors"
-            self.model.save(path)
-            arguments = (str(path), str(self.corpus.path), self.corpus.ids)
-            self.pool = ProcessPoolExecutor(self.workers, get_context("spawn"), _start_worker, arguments)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.bar.close()
-        if self.pool:
-            self.pool.shutdown(cancel_futures=True)
-
-    def errors_of(self, settings: Sequence[dict[str, float]]) -> list[float]:
-        """One for each; what the journal knows is not computed again."""
-        keys = [json.dumps([round(float(np.log(one[name])), 12) for name in RANGES]) for one in settings]
-        missing = [i for i, key in enumerate(keys) if key not in self.journal.errors]
-        jobs = [settings[i] for i in missing]
-        errors = self.pool.map(_work, jobs) if self.pool else (self._error(job) for job in jobs)
-        for i, error in zip(missing, errors, strict=True):
-            self.journal.keep(keys[i], error)
-            self.bar.update()
-        return [self.journal.errors[key] for key in keys]
-
-    def _error(self, settings: dict[str, float]) -> float:
-        return mean_error(self.model.with_weights(**settings), self.examples)
+@lru_cache(maxsize=16)
+def _examples(of: Recordings, ids: tuple[str, ...]) -> list[Example]:
+    return examples_of(_loaded(of.model), Corpus.open(of.corpus).subset(ids))
 
 
-_WORKER: dict[str, Any] = {}
-
-
-def _start_worker(model_path: str, corpus_path: str, ids: tuple[str, ...]) -> None:
-    torch.set_num_threads(1)
-    model = Efase.load(model_path)
-    _WORKER["model"] = model
-    _WORKER["examples"] = examples_of(model, Corpus.open(corpus_path).subset(ids))
-
-
-def _work(settings: dict[str, float]) -> float:
-    return mean_error(_WORKER["model"].with_weights(**settings), _WORKER["examples"])
+def errors_of(job: Job) -> list[float]:
+    """The error of each sentence of a job, by a model and recordings that a process reads once."""
+    return sentence_errors(_changing(job.of.model).speaker(dict(job.settings)), _examples(job.of, job.ids))
