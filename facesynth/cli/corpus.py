@@ -69,6 +69,7 @@ def new(folder: Path, layout_file: Path, emotions: str, as_json: bool, **about: 
 @click.option("--text", help="What is said, for one recording.")
 @click.option("--text-file", type=FILE, help="The same, from a file; or for many, CSV with the columns id and text.")
 @click.option("--phones", type=FILE, help="TextGrid, or lines of `end label`, for one recording.")
+@click.option("--no-phones", is_flag=True, help="Look for none where none are given, for methods that hear the sound alone.")
 @click.option("--speaker", help="Whose phones are taken, where TextGrids hold those of several.")
 @click.option("--language", help="Of the texts, such as de or pt (ISO 639-1); found out otherwise.")
 @click.option("--transcribe", is_flag=True, help="Let Whisper (`fetch whisper`) write down what is said, where nobody says it.")
@@ -113,7 +114,8 @@ def add(
     sound itself. Beside them
     may lie NAME.TextGrid (or .lab), NAME.txt (or .align, .wrd: lines of `start end word`), NAME.emotions.csv, and a CSV
     with the columns id and text for all of them. A FOLDER that is no corpus becomes one that fits the recordings.
-    Without phones and text, the phones are recognised from the sound. A run that was interrupted can be repeated; added
+    Without phones and text, the phones are recognised from the sound; with --no-phones nothing is, until
+    `facesynth corpus align` places them. A run that was interrupted can be repeated; added
     again, only what was given otherwise than before is done anew. FOLDER/import.csv says what was used, what not, and why.
     """
     from facesynth.corpus.add.add import add as add_recordings
@@ -122,6 +124,7 @@ def add(
 
     listed = read_listed(list_file) if list_file else None
     about = {name: value for name in FACTS if (value := given.pop(name)) is not None}
+    given["placing"] = not given.pop("no_phones")
     given["transcriber"] = chosen_transcriber(given.pop("transcribe"), given["transcriber"])
     header = _header(folder, performer, about, listed)
     corpus, guessed = _corpus_for(folder, files, header, followed, given["face"], said, workers)
@@ -286,7 +289,7 @@ def _summary(corpus: Corpus, report: AddReport) -> list[str]:
     lines = [", ".join(f"{what} {count}" for what, count in counts.items() if count or what != "changed")]
     if report.added:
         minutes = sum(corpus.duration_s(name) for name in report.added) / 60
-        phones = Counter(phones_from(corpus.record(name)) for name in report.added)
+        phones = Counter(phones_from(corpus, corpus.record(name)) for name in report.added)
         lines.append(f"added: {_some(report.added)}: {minutes:.1f} minutes, phones {_counted(phones)}")
     lines += _listing("changed", {name: ", ".join(parts) for name, parts in report.changed.items()})
     lines += [*_listing("kept", report.kept), *_listing("not added", report.refused), *_remarks(report.remarks)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,10 +11,9 @@ from facesynth.cli.options import as_json, seeded, spread_over
 from facesynth.cli.types import FILE, FOLDER
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from facesynth.corpus import Corpus
-    from facesynth.corpus.workers import Workers
     from facesynth.evaluation.compare import Evaluation
     from facesynth.evaluation.contestants import Contestant, Family
     from facesynth.evaluation.folds import Fold
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
 @click.option("--minutes", multiple=True, type=click.FloatRange(0.01), help="Each method also by so many minutes of each fold.")
 @click.option("--test-limit", type=click.IntRange(min=2), help="At most so many tested utterances in all.")
 @click.option("--from-predictions", "stored", type=FILE, help="Judge METHOD/ID.npz of this folder; train nothing.")
+@click.option("--closed", is_flag=True, help="Each row once more with lips closed at p, b and m, by the same step for all.")
 @click.option("--no-references", is_flag=True, help="Leave out the reference methods, such as the mean face.")
 @click.option("--show", "shown", multiple=True, metavar="ID", help="Utterances for trajectories and video.")
 @click.option("--no-video", is_flag=True, help="Leave out the videos.")
@@ -51,6 +51,7 @@ def evaluate(
     minutes: tuple[float, ...],
     test_limit: int | None,
     stored: Path | None,
+    closed: bool,
     no_references: bool,
     shown: tuple[str, ...],
     no_video: bool,
@@ -77,13 +78,14 @@ def evaluate(
     recordings = Corpus.open(corpus)
     for utterance_id in shown:
         recordings.record(utterance_id)
-    known, contestants = _contestants(methods, families, minutes, references=not no_references)
+    known, contestants = _contestants(recordings, methods, families, minutes, references=not no_references)
     splits: Sequence[Fold] | None = read_folds(given_folds, recordings) if given_folds else None
     if stored is None:
         if not methods and not families:
             raise click.UsageError("name a method, a --family or --from-predictions")
         splits = splits or make_folds(recordings, folds, seed, test_limit=test_limit, train_minutes=train_minutes)
-    result = _result(recordings, contestants, known, splits, stored, output, seed=seed, workers=workers, device=device)
+    asked: dict[str, Any] = {"seed": seed, "workers": workers, "closed": closed}
+    result = _result(recordings, contestants, known, splits, stored, output, device, asked)
     page = write_report(output, result, recordings, known, Wish(title or recordings.performer, shown, videos=not no_video))
     if as_json:
         click.echo(result.comparison.json())
@@ -103,15 +105,20 @@ def _refuse_training() -> None:
 
 
 def _contestants(
-    methods: Sequence[str], families: Sequence[Path], minutes: Sequence[float], *, references: bool
+    corpus: Corpus, methods: Sequence[str], families: Sequence[Path], minutes: Sequence[float], *, references: bool
 ) -> tuple[list[Family], list[Contestant]]:
-    """Families, and every contestant: the named ones, the families', the reference rows, and all but the families' by minutes."""
-    from facesynth.evaluation.contestants import by_minutes, contestant, read_family
+    """Families, and every contestant: the named ones, the families', the reference rows, and all but the families' by minutes.
+
+    Reference rows that ask for phones are left out where nobody knows them, and that is told.
+    """
+    from facesynth.evaluation.contestants import by_minutes, contestant, read_family, without_phones
     from facesynth.evaluation.contestants import references as reference_rows
 
     read = [read_family(path) for path in families]
     named, variants = [contestant(spec) for spec in methods], [one for _, variants in read for one in variants]
-    known = reference_rows([*named, *variants]) if references else []
+    known, asking = without_phones(reference_rows([*named, *variants]) if references else [], corpus)
+    if asking:
+        click.echo(f"left out, for nobody knows what is said in all recordings: {', '.join(asking)}", err=True)
     less, again = by_minutes([*named, *known], minutes)
     return [family for family, _ in read] + less, named + variants + known + again
 
@@ -123,16 +130,14 @@ def _result(
     splits: Sequence[Fold] | None,
     stored: Path | None,
     output: Path,
-    *,
-    seed: int,
-    workers: Workers,
     device: str,
+    asked: Mapping[str, Any],
 ) -> Evaluation:
     from facesynth.evaluation.compare import evaluate as compare
     from facesynth.evaluation.compare import folds_beside, judge_predictions, predicted_labels
 
     if stored is None:
         assert splits is not None  # noqa: S101 - told apart by the caller
-        return compare(contestants, corpus, splits, output, seed=seed, workers=workers, device=device)
+        return compare(contestants, corpus, splits, output, device=device, **asked)
     labels = predicted_labels(stored, families)
-    return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, labels, seed=seed, workers=workers)
+    return judge_predictions(corpus, splits or folds_beside(stored, corpus), stored, labels, **asked)

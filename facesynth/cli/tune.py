@@ -67,11 +67,6 @@ def _results(found: Any, count: int) -> Iterator[str]:
         yield f"| {one.performer} | {one.found:.4g} | {one.default:.4g} | {one.published:.4g} | {nearer} |"
 
 
-    tuned = f"{found.evaluations} evaluations on {sentences} sentences; {output} holds the settings"
-    errors = f"found {found.test_error:.4g}, published {found.published_test_error:.4g}"
-    show(as_json, asdict(found), [tuned, f"on {test_sentences} other sentences: {errors}"])
-
-
 def _tuner(method: str | None) -> tuple[str, str]:
     """Name of the method and of what searches its settings; FacesynthError where nothing does, or it must be chosen."""
     from facesynth.methods.registry import capabilities_of, known_capabilities

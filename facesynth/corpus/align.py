@@ -35,7 +35,8 @@ class AlignReport:
 def align(corpus: Corpus, ids: Iterable[str] | None = None, force: bool = False, workers: Workers = ALONE) -> AlignReport:
     """Align sound and text of the utterances `ids` (else of all) and write their TextGrids.
 
-    Phones that a person gave or corrected are kept unless `force` is set. The result is the same whoever does the work.
+    Phones that a person gave or corrected are kept unless `force` is set. Where there is neither text nor phones, these are
+    recognised from the sound. The result is the same whoever does the work.
     """
     aligned: list[str] = []
     failed: dict[str, str] = {}
@@ -61,7 +62,7 @@ def is_by_hand(corpus: Corpus, record: Record) -> bool:
 
 
 def _reason_to_keep(corpus: Corpus, record: Record, force: bool) -> str:
-    if not record.text:
+    if not record.text and record.id not in corpus.subset([record.id]).without_phones():
         return "there is no text to align"
     if is_by_hand(corpus, record) and not force:
         return "the phones were given or corrected by hand; --force places them anew"
@@ -72,7 +73,7 @@ def _attempt(files: Files, record: Record) -> FoundPhones | FacesynthError:
     from facesynth.speech.phone_sources import find_phones
 
     try:
-        return find_phones(*load_audio(files.audio(record.id)), text=record.text)
+        return find_phones(*load_audio(files.audio(record.id)), text=record.text or None)
     except FacesynthError as error:
         return error
 

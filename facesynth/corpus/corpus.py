@@ -274,6 +274,11 @@ class Corpus:
         """Edits of nodes, never destructive."""
         return Journal(self.files.journal)
 
+    def without_phones(self) -> tuple[str, ...]:
+        """Usable utterances of which nobody knows what is said."""
+        grids = ((record.id, self.files.phones(record.id)) for record in self.usable_records)
+        return tuple(name for name, path in grids if path.is_file() and not read_textgrid(path)[0].known)
+
     def removed_nodes(self) -> frozenset[str]:
         """Names of nodes that a person removed."""
         return self.journal.removed()

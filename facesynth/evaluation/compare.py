@@ -10,16 +10,26 @@ from filelock import FileLock, Timeout
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.evaluation.contestants import SECOND_TAKE, Contestant, Family, check_labels, references
+from facesynth.evaluation.contestants import (
+    CLOSED,
+    SAME_WORDS,
+    SECOND_TAKE,
+    Contestant,
+    Family,
+    check_labels,
+    is_recorded,
+    references,
+)
 from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
 from facesynth.evaluation.jobs import Job, read_account, run_job
-from facesynth.evaluation.judge import Judge, confusion_of, recogniser_of, sync_of
+from facesynth.evaluation.judge import APART, Judge, confusion_of, recogniser_of, sync_of
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.paired import Difference, compare_pairs
 from facesynth.evaluation.part_statistics import PART_COLUMNS
 from facesynth.evaluation.second_take import second_take
+from facesynth.evaluation.sources import Sources, nearest_gaps, repeated_words
 from facesynth.evaluation.table import Column, Comparison, Row
 from facesynth.evaluation.tallies import Task, refuse_strangers, tally
 from facesynth.evaluation.variety import VARIETY
@@ -60,9 +70,17 @@ class Evaluation:
     """By row label."""
     differences: tuple[Difference, ...]
     folds: tuple[Fold, ...]
-    predictions: Path
+    sources: Sources
+    """What the motions of the rows are read from."""
     accounts: Mapping[str, Sequence[Mapping[str, Any]]]
     """By row label: what the predictions of each fold were made of; nothing for predictions made elsewhere."""
+    remarks: tuple[str, ...] = ()
+    """Why rows are not there."""
+
+    @property
+    def predictions(self) -> Path:
+        """Folder that holds a folder for each method."""
+        return self.sources.predictions
 
     def curves(self, families: Sequence[Family]) -> tuple[Curve, ...]:
         """Error against movement, a curve for each method and for each family that is one method."""
@@ -72,15 +90,16 @@ class Evaluation:
         """What whoever reads the table must know of how its rows were made."""
         sources = {one.get("versions", {}).get("source") for made in self.accounts.values() for one in made}
         if len(sources) < 2:
-            return []
+            return list(self.remarks)
         return [
+            *self.remarks,
             f"The rows were made by {len(sources)} versions of facesynth's source (see “Made of” on the page): "
-            "rows of different ones differ by more than their settings."
+            "rows of different ones differ by more than their settings.",
         ]
 
     def main_columns(self) -> list[str]:
         """Columns of the short table: those of `MAIN` that some method has."""
-        scores = [score for label, score in self.comparison.scores.items() if label != SECOND_TAKE]
+        scores = [score for label, score in self.comparison.scores.items() if not is_recorded(label)]
         known = [name for name in MAIN if any(name in row and row[name].utterances for row in scores)]
         return [name for name in known if OVERTAKEN.get(name) not in known]
 
@@ -94,10 +113,12 @@ def evaluate(
     seed: int = 0,
     workers: Workers = ALONE,
     device: str = "cpu",
+    closed: bool = False,
 ) -> Evaluation:
     """Train every contestant on every fold, let it speak the tested sentences, and judge what it made by the recordings.
 
-    `folder` keeps folds and predictions; what it holds already, made of the same things, is not made again.
+    `folder` keeps folds and predictions; what it holds already, made of the same things, is not made again. closed: each row
+    once more with the lips closed, see `sources`.
     """
     check_labels(contestants)
     check_folds(corpus, folds)
@@ -113,7 +134,7 @@ def evaluate(
         for _ in spread(run_job, jobs, workers, "training and speaking"):
             pass
     labels = [one.label for one in contestants]
-    return judge_predictions(corpus, folds, predictions, labels, seed=seed, workers=workers)
+    return judge_predictions(corpus, folds, predictions, labels, seed=seed, workers=workers, closed=closed)
 
 
 @contextmanager
@@ -134,8 +155,12 @@ def judge_predictions(
     *,
     seed: int = 0,
     workers: Workers = ALONE,
+    closed: bool = False,
 ) -> Evaluation:
-    """Judge stored predictions, ours or anybody's, without training anything; `labels` are all that are there otherwise."""
+    """Judge stored predictions, ours or anybody's, without training anything; `labels` are all that are there otherwise.
+
+    closed: each row once more with the lips closed, see `sources`.
+    """
     check_folds(corpus, folds)
     predictions = Path(predictions)
     labels = predicted_labels(predictions) if labels is None else list(labels)
@@ -145,10 +170,12 @@ def judge_predictions(
     judges = judges_of(corpus, folds, tested)
     reach = residual_reach(track(tested, "recorded movement", len(tested)))
     accounts = {label: _accounts(predictions / label, len(folds)) for label in labels}
-    tasks = [
-        Task(corpus.path, corpus.ids, predictions, label, tested.ids, judges, reach, _part(accounts.get(label, ())))
-        for label in (SECOND_TAKE, *labels)
-    ]
+    words, remark = repeated_words(corpus, tested.ids)
+    sources = Sources(predictions, words, nearest_gaps(corpus, folds) if closed else {})
+    parts = {label: _part(accounts.get(label, ())) for label in (SECOND_TAKE, *((SAME_WORDS,) if words else ()), *labels)}
+    parts |= {label + CLOSED: part for label, part in parts.items() if closed and part not in APART}
+    ordered = sorted(parts, key=lambda label: list(parts).index(label.removesuffix(CLOSED)))
+    tasks = [Task(corpus.path, corpus.ids, sources, label, tested.ids, judges, reach, parts[label]) for label in ordered]
     judged = list(spread(tally, tasks, workers, "judging"))
     rows = [_with_costs(one.row, accounts.get(one.row.label, ()), one.costs) for one in judged]
     rows[0] = _explain_second_take(rows[0], corpus, tested)
@@ -164,7 +191,9 @@ def judge_predictions(
         tuple(corpus.record(i).emotion for i in tested.ids),
     )
     details = {one.row.label: one.details for one in judged}
-    return Evaluation(comparison, details, compare_pairs(comparison), tuple(folds), predictions, accounts)
+    return Evaluation(
+        comparison, details, compare_pairs(comparison), tuple(folds), sources, accounts, (remark,) if remark else ()
+    )
 
 
 def folds_beside(predictions: str | Path, corpus: Corpus) -> tuple[Fold, ...]:
@@ -185,11 +214,11 @@ def predicted_labels(predictions: Path, families: Sequence[Family] = ()) -> list
     if not predictions.is_dir():
         raise FacesynthError(f"{predictions}: no such folder; it should hold a folder of NPZ files for each method")
     labels = sorted(path.name for path in predictions.iterdir() if path.is_dir() and any(path.glob("*.npz")))
-    if not [label for label in labels if label != SECOND_TAKE]:
+    if not [label for label in labels if not is_recorded(label)]:
         raise FacesynthError(f"{predictions} holds no predictions; wanted METHOD/UTTERANCE.npz in the documented form")
     ordered = [label for family in families for label in family.labels] + [one.label for one in references()]
     last = [label for label in dict.fromkeys(ordered) if label in labels]
-    return [label for label in labels if label not in (SECOND_TAKE, *last)] + last
+    return [label for label in labels if not is_recorded(label) and label not in last] + last
 
 
 def judges_of(corpus: Corpus, folds: Sequence[Fold], tested: Corpus) -> dict[str, Judge]:
@@ -254,5 +283,5 @@ def _columns(rows: Sequence[Row], tested: Corpus) -> tuple[Column, ...]:
     known += [Column(name, tested.layout.unit, "" if name == "diversity" else "low") for name in VARIETY]
     names = {column.name for column in known}
     own = list(dict.fromkeys(name for row in rows for name in row.values if name not in names))
-    moved = [column for column in PART_COLUMNS if any(column.name in row.costs for row in rows if row.label != SECOND_TAKE)]
+    moved = [column for column in PART_COLUMNS if any(column.name in row.costs for row in rows if not is_recorded(row.label))]
     return (*known, *(Column(name, "1", "1" if name == "join_jump" else "") for name in own), *moved, *COSTS)

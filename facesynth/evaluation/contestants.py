@@ -17,10 +17,19 @@ from facesynth.methods.registry import capabilities_of, create, known_capabiliti
 from facesynth.methods.training import train
 
 SECOND_TAKE = "second take"
-"""The label of the row that is a recording."""
+"""The label of the row that is another recording of the same sentence."""
+SAME_WORDS = "same words"
+"""… and of the one that is put together from recordings of its words in other sentences."""
+CLOSED = ", lips closed"
+"""The end of a row's label where the lips of the row were closed at p, b and m by the same step as all others'."""
 FAMILY_KEYS = ("title", "method", "include", "axis", "log", "curve", "variants")
 OWN_KEYS = ("minutes", "speak", "method")
 """Keys of a variant that are not settings of its method."""
+
+
+def is_recorded(label: str) -> bool:
+    """Whether a row is made of recordings, and so competes with nobody."""
+    return label.removesuffix(CLOSED) in (SECOND_TAKE, SAME_WORDS)
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,8 @@ class Contestant:
     """Learn from so many minutes of each fold; None: from all."""
 
     def __post_init__(self) -> None:
-        if self.label == SECOND_TAKE or not re.fullmatch(r"\w[\w .+=,-]*", self.label) or self.label.endswith((" ", ".")):
+        ours = is_recorded(self.label) or self.label.endswith(CLOSED)
+        if ours or not re.fullmatch(r"\w[\w .+=,-]*", self.label) or self.label.endswith((" ", ".")):
             raise FacesynthError(
                 f"{self.label!r} cannot be a method's label, which names a folder; use letters, digits and spaces"
             )
@@ -85,6 +95,14 @@ def references(contestants: Sequence[Contestant] = ()) -> list[Contestant]:
     parts |= {"mouth"} if "expression" in parts else set()
     known = [one for one in known_capabilities()[0] if one.reference]
     return [Contestant(one.reference, one.name) for one in known if not parts or one.part in parts]
+
+
+def without_phones(rows: Sequence[Contestant], corpus: Corpus) -> tuple[list[Contestant], list[str]]:
+    """The reference rows that a corpus can teach, and labels of those that ask for phones where it has none."""
+    if not corpus.without_phones():
+        return list(rows), []
+    asking = [one.label for one in rows if one.create().needs_phones]
+    return [one for one in rows if one.label not in asking], asking
 
 
 def contestant(spec: str) -> Contestant:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from facesynth.evaluation.contestants import SECOND_TAKE, Family
+from facesynth.evaluation.contestants import Family, is_recorded
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, lve_centred
 from facesynth.evaluation.pair import Array, UnavailableError, require_alike
@@ -148,8 +148,8 @@ def curves_of(points: Mapping[str, Sequence[Point]], families: Sequence[Family])
 
 def _curve(name: str, settings: Sequence[tuple[str, Sequence[Point]]]) -> Curve:
     named = [replace(point, setting=label) for label, points in settings for point in points]
-    own = tuple(p for p in named if p.gain == 1 and (p.sharpening == 0 or name != SECOND_TAKE))
-    return Curve(name, own, tuple(p for p in named if p.gain != 1 and name != SECOND_TAKE))
+    own = tuple(p for p in named if p.gain == 1 and (p.sharpening == 0 or not is_recorded(name)))
+    return Curve(name, own, tuple(p for p in named if p.gain != 1 and not is_recorded(name)))
 
 
 def _lips(motion: Motion, points: NDArray[np.floating], lips: NDArray[np.int64]) -> Motion:

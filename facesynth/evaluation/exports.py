@@ -13,7 +13,7 @@ import numpy as np
 
 from facesynth.atomic import write_text
 from facesynth.evaluation.compare import Evaluation
-from facesynth.evaluation.contestants import Family
+from facesynth.evaluation.contestants import Family, is_recorded
 from facesynth.evaluation.curve import Curve
 from facesynth.evaluation.details import Details, overall_aligned
 from facesynth.evaluation.paired import statements
@@ -46,7 +46,16 @@ def write_exports(folder: Path, result: Evaluation, families: Sequence[Family]) 
 
 
 def latex(comparison: Comparison, columns: Sequence[str]) -> str:
-    """A table for `booktabs`: mean with the half width of the 95 % interval, the best of each column bold."""
+    """Tables for `booktabs`: mean with the half width of the 95 % interval, the best of each column bold.
+
+    The first is of all utterances; each further one, under its title, of those that some row has alone.
+    """
+    (_, whole), *partial = comparison.tables()
+    spoken = comparison.measured(columns)
+    return "\n".join([_tabular(whole, columns), *(f"% {title}\n{_tabular(part, spoken)}" for title, part in partial)])
+
+
+def _tabular(comparison: Comparison, columns: Sequence[str]) -> str:
     chosen = [column for column in comparison.columns if column.name in columns]
     lines = [r"\begin{tabular}{l" + "r" * len(chosen) + "}", r"\toprule"]
     heads = [escape(c.name) + (f" ({escape(c.unit)})" if c.unit != "1" else "") + " " + WAYS[c.best] for c in chosen]
@@ -61,9 +70,10 @@ def latex(comparison: Comparison, columns: Sequence[str]) -> str:
 def best_labels(comparison: Comparison, figure: str, best: str) -> set[str]:
     """Rows with the best mean of a figure; none where no way is better.
 
-    The second take does not compete, nor does who lacks utterances that others have.
+    Recordings do not compete, nor does who lacks utterances that others have.
     """
-    scores = {row.label: comparison.scores[row.label][figure] for row in comparison.rows[1:]}
+    rows = [row for row in comparison.rows if not is_recorded(row.label)]
+    scores = {row.label: comparison.scores[row.label][figure] for row in rows}
     means = {label: score.mean for label, score in scores.items() if score.whole}
     known = {label: _badness(mean, best) for label, mean in means.items() if math.isfinite(mean)}
     return {label for label, bad in known.items() if bad <= min(known.values())} if best else set()

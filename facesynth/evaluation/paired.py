@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from facesynth.evaluation.contestants import SECOND_TAKE
+from facesynth.evaluation.contestants import is_recorded
 from facesynth.evaluation.table import Column, Comparison, Row
 from facesynth.inference.arrays import Floats
 
@@ -69,7 +69,7 @@ def compare_pairs(comparison: Comparison, figures: Sequence[str] = COMPARED) -> 
     columns = [column for column in comparison.columns if column.name in figures]
     found: list[tuple[Column, Row, Row, Floats]] = []
     for column in columns:
-        for first, second in combinations([row for row in comparison.rows if row.label != SECOND_TAKE], 2):
+        for first, second in combinations([row for row in comparison.rows if not is_recorded(row.label)], 2):
             worse = _worse(first, column, len(sentences)) - _worse(second, column, len(sentences))
             by_sentence = _by_sentence(worse, sentences)
             if (~np.isnan(by_sentence)).sum() >= 2:

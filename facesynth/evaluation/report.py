@@ -14,7 +14,7 @@ from facesynth.atomic import write_text
 from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation import figures
 from facesynth.evaluation.compare import Evaluation
-from facesynth.evaluation.contestants import SECOND_TAKE, Family, references
+from facesynth.evaluation.contestants import SAME_WORDS, SECOND_TAKE, Family, is_recorded, references
 from facesynth.evaluation.curve import LIVELY, MEASURES, Curve, Measure, Point
 from facesynth.evaluation.curve_figure import curve_figure
 from facesynth.evaluation.details import Details
@@ -27,7 +27,6 @@ from facesynth.evaluation.pair import Array
 from facesynth.evaluation.paired import statements, tallied
 from facesynth.evaluation.point_face import PointFace
 from facesynth.evaluation.table import ARROWS, Comparison, short_number
-from facesynth.evaluation.tallies import read_motion
 from facesynth.evaluation.trajectories import MOST_SHOWN, trajectory_figure
 from facesynth.evaluation.verdict import verdicts
 from facesynth.inference.errors import FacesynthError
@@ -38,7 +37,7 @@ PAGE = "index.html"
 MOST_PANELS = 5
 MOST_IN_WORDS = 9
 """Of more rows a sentence each would be read by nobody."""
-SHOWN_LAST = ("tcn", "ridge", SECOND_TAKE, "phone mean", "mean face")
+SHOWN_LAST = ("tcn", "ridge", SAME_WORDS, SECOND_TAKE, "phone mean", "mean face")
 """Rows that are drawn where there is room, in this order: the less they move, the later."""
 SHAPE_FRAMES = 4000
 """Recorded frames from which the shape at rest comes."""
@@ -86,10 +85,10 @@ def _contents(result: Evaluation, corpus: Corpus, families: Sequence[Family], wi
     return {
         "wish": wish,
         "synthetic": corpus.synthetic,
-        "main": table(comparison, result.main_columns()),
-        "whole": table(comparison, [column.name for column in comparison.columns]),
-        "notes": result.warnings() + comparison.markdown(result.main_columns()).split("\n\n")[1:],
-        "whole_notes": comparison.markdown().split("\n\n")[1:],
+        "main": _tables(comparison, result.main_columns()),
+        "whole": _tables(comparison, [column.name for column in comparison.columns]),
+        "notes": result.warnings() + comparison.notes(result.main_columns()),
+        "whole_notes": comparison.notes([column.name for column in comparison.columns]),
         "verdicts": verdicts(result),
         "many": len(comparison.rows) > MOST_IN_WORDS,
         "left_out": len(comparison.rows) - len(pictured),
@@ -119,7 +118,7 @@ def pictured_rows(comparison: Comparison, families: Sequence[Family]) -> list[st
     variants = {label for family in families for label in family.labels}
     rows = [row.label for row in comparison.rows]
     named = [label for label in rows if label not in variants]
-    if set(named) - {SECOND_TAKE, *(one.label for one in references())}:
+    if {label for label in named if not is_recorded(label)} - {one.label for one in references()}:
         return named
     firsts = {family.labels[0] for family in families}
     return [label for label in rows if label in firsts or label not in variants]
@@ -140,12 +139,23 @@ def table(comparison: Comparison, columns: Sequence[str], labels: Sequence[str] 
     return {"heads": heads, "rows": rows}
 
 
-def _by_emotion(comparison: Comparison, columns: Sequence[str], labels: Sequence[str]) -> dict[str, dict[str, Any]]:
+def _tables(
+    comparison: Comparison, columns: Sequence[str], labels: Sequence[str] | None = None
+) -> list[tuple[str, dict[str, Any]]]:
+    """With titles, a table of the rows that have all utterances, and for rows that lack some one of what they have."""
+    (_, whole), *partial = comparison.tables()
+    spoken = comparison.measured(columns)
+    return [("", table(whole, columns, labels)), *((title, table(part, spoken, labels)) for title, part in partial)]
+
+
+def _by_emotion(
+    comparison: Comparison, columns: Sequence[str], labels: Sequence[str]
+) -> dict[str, list[tuple[str, dict[str, Any]]]]:
     found = dict.fromkeys(sorted(comparison.emotions))
     if len(found) < 2:
         return {}
-    quality = [name for name in columns if any(name in row.values for row in comparison.rows)]
-    return {emotion: table(comparison.of_emotion(emotion), quality, labels) for emotion in found}
+    quality = comparison.measured(columns)
+    return {emotion: _tables(comparison.of_emotion(emotion), quality, labels) for emotion in found}
 
 
 def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: Mapping[str, str]) -> dict[str, Any]:
@@ -154,7 +164,7 @@ def _curves(result: Evaluation, families: Sequence[Family], unit: str, colours: 
     Variants of a family that is no single method are left out: they have a picture of their own.
     """
     curves = [curve for curve in result.curves(families) if curve.label in colours]
-    known = (*(one.label for one in references()), SECOND_TAKE)
+    known = (*(one.label for one in references()), SECOND_TAKE, SAME_WORDS)
     rows = [
         (
             curve.label,
@@ -198,7 +208,7 @@ def _shown(
     worst = worst_shown(np.concatenate([one.points for one in result.details.values()]))
     for utterance_id in track(wish.shown or typical(result), "pictures"):
         utterance = corpus[utterance_id]
-        motions = {label: made for label in order if (made := read_motion(corpus, result.predictions, label, utterance_id))}
+        motions = {label: made for label in order if (made := result.sources.motion(corpus, label, utterance_id))}
         faces = {label: made for label, made in motions.items() if len(result.details[label].points)}
         drawn = {label: faces[label] for label in labels if label in islice(faces, MOST_SHOWN)}
         yield {
@@ -214,7 +224,7 @@ def _shown(
 def _heads(utterance: Utterance, motions: Mapping[str, Motion]) -> str:
     """The heads of an utterance; nothing where nobody recorded one, or no method moves one."""
     recorded = utterance.motion.head
-    moved = {label: one.head for label, one in motions.items() if one.head is not None and label != SECOND_TAKE}
+    moved = {label: one.head for label, one in motions.items() if one.head is not None and not is_recorded(label)}
     if recorded is None or not moved:
         return ""
     heads = {RECORDED: recorded, **dict(islice(moved.items(), MOST_SHOWN))}
@@ -231,7 +241,7 @@ def _video(utterance_id: str, corpus: Corpus, motions: Mapping[str, Motion], fac
 def typical(result: Evaluation) -> tuple[str, ...]:
     """The utterances at the median and at the top of the first method's lip error."""
     comparison = result.comparison
-    first = comparison.rows[min(1, len(comparison.rows) - 1)]
+    first = next((row for row in comparison.rows if not is_recorded(row.label)), comparison.rows[0])
     values = np.asarray(first.values.get("lve", first.values.get("marker_error", ())), np.float64)
     known = np.flatnonzero(~np.isnan(values))
     if not len(known):

@@ -5,7 +5,7 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -101,25 +101,66 @@ class Comparison:
 
     def of_emotion(self, emotion: str) -> "Comparison":
         """The same methods on the utterances of one emotion; figures of the whole run are left out."""
-        chosen = [i for i, one in enumerate(self.emotions) if one == emotion]
-        rows = tuple(
+        return self._of([i for i, one in enumerate(self.emotions) if one == emotion], self.rows)
+
+    @cached_property
+    def missing(self) -> Mapping[str, frozenset[int]]:
+        """By row label: utterances of which it has no figure although others have; none for a row that has no figure at all."""
+        count = len(self.utterances)
+        has = {row.label: _known_of(row, count) for row in self.rows}
+        anybody = np.any(list(has.values()), axis=0) if has else np.zeros(count, bool)
+        return {
+            label: frozenset(np.flatnonzero(anybody & ~own).tolist()) if own.any() else frozenset() for label, own in has.items()
+        }
+
+    def tables(self) -> "list[tuple[str, Comparison]]":
+        """The same as tables with titles, in each of which all rows are of the same utterances.
+
+        The first, without a title, has the rows of all utterances. A row that lacks some is in one of its own, beside all
+        rows that have what it has; figures of the whole run are left out there.
+        """
+        whole = tuple(row for row in self.rows if not self.missing[row.label])
+        found = [("", replace(self, rows=whole))]
+        for gap in dict.fromkeys(missing for missing in self.missing.values() if missing):
+            labels = ", ".join(label for label, missing in self.missing.items() if missing == gap)
+            chosen = [i for i in range(len(self.utterances)) if i not in gap]
+            spoken = [row for row in self.rows if _known_of(row, len(self.utterances)).any()]
+            rows = [row for row in spoken if self.missing[row.label] <= gap]
+            found.append((f"On the {len(chosen)} of {len(self.utterances)} utterances of {labels}:", self._of(chosen, rows)))
+        return found
+
+    def measured(self, columns: Sequence[str]) -> list[str]:
+        """Those of the columns that are figures of utterances."""
+        return [name for name in columns if any(name in row.values for row in self.rows)]
+
+    def _of(self, chosen: Sequence[int], rows: Sequence[Row]) -> "Comparison":
+        parts = tuple(
             Row(row.label, {name: tuple(values[i] for i in chosen) for name, values in row.values.items()}, {}, row.reasons)
-            for row in self.rows
+            for row in rows
         )
-        names, sentences, emotions = (tuple(of[i] for i in chosen) for of in (self.utterances, self.sentences, self.emotions))
-        return Comparison(self.columns, names, rows, self.seed, sentences=sentences, emotions=emotions)
+        of_each = (self.utterances, self.sentences, self.emotions)
+        names, sentences, emotions = (tuple(of[i] for i in chosen if of) for of in of_each)
+        return Comparison(self.columns, names, parts, self.seed, sentences=sentences, emotions=emotions)
 
     def markdown(self, columns: Sequence[str] | None = None) -> str:
-        """A table, a row per method: mean [95 % interval]; under it why figures are missing."""
-        chosen = [self._column(name) for name in columns] if columns else list(self.columns)
+        """A table, a row per method: mean [95 % interval]; then those of rows that lack utterances (see `tables`), and why
+        figures are missing.
+        """
+        (_, whole), *partial = self.tables()
+        names = list(columns) if columns else [column.name for column in self.columns]
+        spoken = self.measured(names)
+        tables = [whole._markdown(names), *(f"{title}\n\n{part._markdown(spoken)}" for title, part in partial)]
+        return "\n\n".join([*tables, *self.notes(names)]) + "\n"
+
+    def _markdown(self, columns: Sequence[str]) -> str:
+        chosen = [self._column(name) for name in columns]
         header = [
             "method",
             *(f"{c.name} ({c.unit}){ARROWS[c.best]}" if c.unit != "1" else c.name + ARROWS[c.best] for c in chosen),
         ]
         lines = [header, ["---"] + ["---:"] * len(chosen)]
         lines += [[row.label, *(str(self.scores[row.label][c.name]) for c in chosen)] for row in self.rows]
-        table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-        return "\n\n".join([table, *self._notes(chosen)]) + "\n"
+        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def csv(self) -> str:
         """A line per method and figure: mean, interval, number of utterances, and why some are missing."""
@@ -167,8 +208,9 @@ class Comparison:
                 return column
         raise unknown("figure", name, (column.name for column in self.columns))
 
-    def _notes(self, chosen: Sequence[Column]) -> list[str]:
+    def notes(self, columns: Sequence[str]) -> list[str]:
         """Reasons for missing figures, one for each, and the ceiling of the emotion classifier."""
+        chosen = [self._column(name) for name in columns]
         labels: dict[tuple[str, str], list[str]] = {}
         for column in chosen:
             for row in self.rows:
@@ -196,6 +238,14 @@ class Comparison:
             "reasons": dict(row.reasons),
             "confusion": _confusion_dict(row.confusion),
         }
+
+
+def _known_of(row: Row, count: int) -> NDArray[np.bool_]:
+    """[U] whether a row has any figure of each utterance."""
+    known = np.zeros(count, bool)
+    for values in row.values.values():
+        known |= ~np.isnan(np.asarray(values, np.float64))
+    return known
 
 
 def interval(values: NDArray[np.float64], sentences: Sequence[str], seed: int) -> tuple[float, float]:

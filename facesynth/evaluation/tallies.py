@@ -1,18 +1,18 @@
 """Judging all stored predictions of one method."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.evaluation.contestants import SECOND_TAKE
+from facesynth.evaluation.contestants import is_recorded
 from facesynth.evaluation.details import Details, DetailSums
 from facesynth.evaluation.dynamics import join_jump
 from facesynth.evaluation.judge import APART, NAN, Judge, Tally, moves_alone
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.part_statistics import PART_COLUMNS, PartSums
-from facesynth.evaluation.predictions import Beside, load_prediction, read_beside, sample_paths
-from facesynth.evaluation.second_take import retimed, second_take
+from facesynth.evaluation.predictions import Beside, read_beside, sample_paths
+from facesynth.evaluation.sources import Sources, stored_motion
 from facesynth.evaluation.table import Row
 from facesynth.evaluation.two_sample import two_sample
 from facesynth.evaluation.variety import VARIETY
@@ -28,7 +28,7 @@ class Task:
     corpus: Path
     known: tuple[str, ...]
     """Utterances of the corpus that there are: those left out are no second takes either."""
-    predictions: Path
+    sources: Sources
     label: str
     tested: tuple[str, ...]
     judges: Mapping[str, Judge]
@@ -53,7 +53,7 @@ def tally(task: Task) -> Judged:
     corpus, spent = Corpus.open(task.corpus).subset(task.known), list[Beside]()
     figures, sums, parts, motions = Tally(), DetailSums(task.reach), PartSums(), dict[str, Motion]()
     for utterance_id in task.tested:
-        motion = read_motion(corpus, task.predictions, task.label, utterance_id)
+        motion = task.sources.motion(corpus, task.label, utterance_id)
         if motion is None:
             figures.miss(f"{task.label} has no prediction of some utterances")
             continue
@@ -62,9 +62,9 @@ def tally(task: Task) -> Judged:
         parts.add(utterance, motion, task.part)
         if task.part not in APART:
             sums.add(utterance, motion)
-        if task.label == SECOND_TAKE:
+        if is_recorded(task.label):
             continue
-        path = task.predictions / task.label / f"{utterance_id}.npz"
+        path = task.sources.predictions / task.label / f"{utterance_id}.npz"
         if task.part not in APART:
             _add_variety(figures, path, motion, utterance, corpus)
         if beside := read_beside(path):
@@ -77,24 +77,6 @@ def tally(task: Task) -> Judged:
     alone = moves_alone(task.part) if task.part in APART else "the method moves neither head nor eyes, or nobody recorded them"
     figures.reasons |= {column.name: alone for column in PART_COLUMNS if column.name not in moved}
     return Judged(figures.row(task.label, {}), sums.details(), _rates(spent) | moved)
-
-
-def read_motion(corpus: Corpus, predictions: Path, label: str, utterance_id: str) -> Motion | None:
-    """A method's stored prediction of an utterance, or its second take; None where there is none."""
-    if label == SECOND_TAKE:
-        take = second_take(corpus, utterance_id)
-        return retimed(take, corpus[utterance_id].speech.phones) if take else None
-    path = predictions / label / f"{utterance_id}.npz"
-    return _motion(path, utterance_id, corpus) if path.is_file() else None
-
-
-def _motion(path: Path, utterance_id: str, corpus: Corpus) -> Motion:
-    """Of the same points, so that the corpus alone says which of them are the lips: a prediction's groups do not count."""
-    named, motion = load_prediction(path, corpus.layout)
-    if named != utterance_id:
-        raise FacesynthError(f"{path} says that it is utterance {named!r}; its name says {utterance_id!r}: rename one")
-    mine, wanted = motion.layout, corpus.layout
-    return replace(motion, layout=wanted) if (mine.kind, mine.names) == (wanted.kind, wanted.names) else motion
 
 
 def refuse_strangers(corpus: Corpus, folder: Path) -> None:
@@ -115,7 +97,7 @@ def _rates(spent: Sequence[Beside]) -> dict[str, float]:
 
 
 def _add_variety(figures: Tally, path: Path, motion: Motion, utterance: Utterance, corpus: Corpus) -> None:
-    samples = [motion, *(_motion(one, utterance.id, corpus) for one in sample_paths(path))]
+    samples = [motion, *(stored_motion(one, utterance.id, corpus) for one in sample_paths(path))]
     if len(samples) < 2:
         return
     for name in VARIETY:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from facesynth.evaluation.compare import Evaluation
-from facesynth.evaluation.contestants import SECOND_TAKE
+from facesynth.evaluation.contestants import is_recorded
 from facesynth.evaluation.curve import Point
 from facesynth.evaluation.paired import Difference
 from facesynth.evaluation.table import short_number
@@ -31,7 +31,7 @@ class Verdict:
 
 def verdicts(result: Evaluation) -> list[Verdict]:
     """A sentence or two on each method; nothing where there is no mean face to compare with."""
-    labels = [row.label for row in result.comparison.rows if row.label not in (SECOND_TAKE, MEAN_FACE)]
+    labels = [row.label for row in result.comparison.rows if row.label != MEAN_FACE and not is_recorded(row.label)]
     scores = result.comparison.scores
     if MEAN_FACE not in scores:
         return []

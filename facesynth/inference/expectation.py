@@ -18,9 +18,9 @@ from .folder import Folder
 from .graphs import Graph
 from .heard import exported_listening
 from .long_arrays import BLOCK_ROWS, joined
-from .phones import PHONES
+from .phones import PHONES, SILENCE
 from .sound import resample
-from .speech import NEUTRAL, Speech
+from .speech import NEUTRAL, PhoneTrack, Speech
 
 RATE, BANDS_FPS = 16000, 100.0
 """Of the sound that bands are taken from, Hz, and of the bands; band frame k is centred on k / BANDS_FPS seconds."""
@@ -83,15 +83,21 @@ class Said:
 
     @classmethod
     def of(cls, speech: Speech, emotions: tuple[str, ...]) -> Self:
-        """Phones and emotions of a speech; what an emotion lacks in intensity is neutral, where the model knows that."""
-        felt, intensity = speech.emotions.per_phone(speech.phones)
+        """Phones and emotions of a speech; what an emotion lacks in intensity is neutral, where the model knows that.
+
+        Of speech whose phones nobody knows, each emotion is one piece.
+        """
+        track, feelings = speech.phones, speech.emotions
+        if not track.known:
+            track = PhoneTrack((SILENCE,) * len(feelings.labels), feelings.ends_s)
+        felt, intensity = feelings.per_phone(track)
         if strange := next((emotion for emotion in felt if emotion not in emotions), None):
             raise unknown("emotion", strange, emotions)
         shares = np.eye(len(emotions), dtype=np.float32)[[emotions.index(emotion) for emotion in felt]]
         if NEUTRAL in emotions:
             calm = np.eye(len(emotions), dtype=np.float32)[emotions.index(NEUTRAL)]
             shares = calm + intensity[:, None].astype(np.float32) * (shares - calm)
-        return cls([PHONES.index(label) for label in speech.phones.labels], speech.phones.ends_s, shares)
+        return cls([PHONES.index(label) for label in track.labels], track.ends_s, shares)
 
     @classmethod
     def unknown(cls, emotion: int, count: int) -> Self:

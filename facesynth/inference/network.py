@@ -54,6 +54,11 @@ class Network:
     """Of the folder that it comes from."""
 
     @property
+    def needs_phones(self) -> bool:
+        """Whether it must be told what is said."""
+        return self.expectation.reading.phones
+
+    @property
     def look_ahead_s(self) -> float:
         """In a stream frame t waits for the sound up to t / fps + this, seconds, or less."""
         return self.late_s(AHEAD_S)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .checks import checked_audio
 from .errors import FacesynthError
+from .phones import SILENCE
 
 NEUTRAL = "neutral"
 """The emotion that intensities lead down to."""
@@ -33,6 +34,16 @@ class PhoneTrack:
 
     def __len__(self) -> int:
         return len(self.labels)
+
+    @classmethod
+    def unknown(cls, duration_s: float) -> Self:
+        """The track of a sound of which nobody knows what is said: one silence that nothing vouches for."""
+        return cls((SILENCE,), np.array([duration_s]), np.zeros(1))
+
+    @property
+    def known(self) -> bool:
+        """Whether anybody says what is spoken, be it that nobody speaks."""
+        return self.confidences is None or bool(self.confidences.any()) or any(label != SILENCE for label in self.labels)
 
     @property
     def starts_s(self) -> NDArray[np.float64]:

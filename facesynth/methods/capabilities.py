@@ -212,6 +212,8 @@ class Capabilities:
     """Its own options of `speak`."""
     abilities: frozenset[type] = field(default_factory=frozenset)
     """Of the protocols above."""
+    needs_phones: bool = True
+    """Whether it must be told what is said; one that hears the sound alone is asked for none, but may use given ones."""
     layouts: tuple[str, ...] = ("markers", "landmarks", "curves")
     """Kinds of motion that it learns."""
     minutes: float = 0.0

@@ -108,6 +108,11 @@ class Method(nn.Module):
         reject_options(self.name, options, ("seed", *(option.name for option in self.capabilities.options)))
 
     @property
+    def needs_phones(self) -> bool:
+        """Whether it must be told what is said, as it is set; see `Capabilities`."""
+        return self.capabilities.needs_phones
+
+    @property
     def device(self) -> torch.device:
         """Where its tensors are, and where `fit` leaves what it learns."""
         return next(iter(self.state_dict(keep_vars=True).values())).device
@@ -132,6 +137,8 @@ class Method(nn.Module):
             raise FacesynthError(
                 f"{corpus.path} has no usable utterance to learn from; record more, or see `facesynth corpus check`"
             )
+        if self.needs_phones and not silent:
+            require_phones(corpus, self.name)
         kind, known = corpus.layout.kind, self.capabilities.layouts
         if kind not in known:
             raise FacesynthError(f"{self.name} learns {' or '.join(known)}; {corpus.path} holds {kind}")
@@ -163,3 +170,14 @@ class Method(nn.Module):
         method.facts, method.provenance = header["facts"], header["provenance"]
         read_tensors(path, method, header)
         return method.eval()
+
+
+def require_phones(corpus: Corpus, name: str) -> None:
+    """FacesynthError where a method that must be told what is said would learn from recordings of which nobody knows it."""
+    unknown = corpus.without_phones()
+    if unknown:
+        count = f"{len(unknown)} of {len(corpus)} recordings of {corpus.path}" if len(unknown) > 1 else unknown[0]
+        raise FacesynthError(
+            f"{name} learns from phones, and nobody knows those of {count}; `facesynth corpus align` places them,"
+            " or take a method that hears the sound alone (ridge, lds, network phones=false)"
+        )

@@ -32,6 +32,11 @@ class TrainedModel(Protocol):
         ...
 
     @property
+    def needs_phones(self) -> bool:
+        """Whether it must be told what is said."""
+        ...
+
+    @property
     def fitted_layout(self) -> Layout:
         """Of its motion."""
         ...
@@ -61,6 +66,11 @@ class ExportedModel:
         """Of its motion."""
         layout: Layout = self.model.layout
         return layout
+
+    @property
+    def needs_phones(self) -> bool:
+        """Whether it must be told what is said: the exported model says so, where its settings decide."""
+        return bool(getattr(self.model, "needs_phones", self.capabilities.needs_phones))
 
     @cached_property
     def provenance(self) -> Mapping[str, Any]:

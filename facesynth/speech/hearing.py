@@ -38,10 +38,12 @@ def hear(
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
+    phones_needed: bool = True,
 ) -> Heard:
     """Read a sound or video file with its phones and emotions; the tracks are exactly as long as the sound.
 
-    Phones are found as `find_phones` does it, `phones_path` being those that are given. Emotions come from the track
+    Phones are found as `find_phones` does it, `phones_path` being those that are given; `phones_needed=False` leaves them unknown
+    where nobody gave phones or words, for models that need none (`needs_phones`). Emotions come from the track
     `emotions_path`, else are one label for the whole (neutral if none is given) at an intensity from 0 to 1.
     FacesynthError says what cannot be used.
     """
@@ -57,6 +59,7 @@ def hear(
         emotion=emotion,
         emotions_path=emotions_path,
         intensity=intensity,
+        phones_needed=phones_needed,
     )
     return replace(heard, warnings=(*sound.remarks, *heard.warnings))
 
@@ -73,12 +76,22 @@ def hear_sound(
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
+    phones_needed: bool = True,
 ) -> Heard:
     """The same for a sound [S], -1..1, at `rate` Hz."""
     if phones_path is None:
         require_sound(audio, rate)
     emotions = _emotions(emotion, emotions_path, intensity, len(audio) / rate)
-    found = find_phones(audio, rate, given=phones_path, speaker=speaker, text=text, language=language, transcriber=transcriber)
+    found = find_phones(
+        audio,
+        rate,
+        given=phones_path,
+        speaker=speaker,
+        text=text,
+        language=language,
+        transcriber=transcriber,
+        needed=phones_needed,
+    )
     if set(found.phones.labels) != {SILENCE}:  # who says that nobody speaks may give a sound without any
         require_sound(audio, rate)
     spoken = text if text is not None else found.text or " ".join(word for word, _, _ in found.words)

@@ -20,9 +20,11 @@ from facesynth.speech.textgrid import SAME_LENGTH_S, is_textgrid, read_labelled
 from facesynth.speech.transcript import words_of
 from facesynth.speech.transcription import Transcript, transcribe
 
-Source = Literal["textgrid", "labels", "transcript", "transcription", "recognition"]
+Source = Literal["textgrid", "labels", "transcript", "transcription", "recognition", "none"]
 PLACED: tuple[Source, ...] = ("transcript", "transcription", "recognition")
 """By a program: nobody gave the phones."""
+UNSOUGHT: Source = "none"
+"""Nobody gave phones, and nobody needs them: none were looked for."""
 QUOTED = 60
 """Letters of a transcript that are told."""
 
@@ -51,16 +53,20 @@ def find_phones(
     text: str | None = None,
     language: str | None = None,
     transcriber: Path | None = None,
+    needed: bool = True,
 ) -> FoundPhones:
     """Phones of a sound [S], -1..1, at `rate` Hz: those that are given, else aligned with the words, else heard.
 
     given: a TextGrid, of which the phones of `speaker` are taken where it holds several, or lines of `end label`; text: what
     is said; language: of the text (ISO 639-1), found out where nobody says. What is heard without a text may be in any language.
-    transcriber: a folder with a model that writes down what is said, where no text is given. FacesynthError where none of it
+    transcriber: a folder with a model that writes down what is said, where no text is given. needed: whether phones are looked
+    for where neither they nor words are given; otherwise they stay unknown. FacesynthError where none of it
     can be used.
     """
     if given is not None:
         return _read(given, len(audio) / rate, speaker)
+    if text is None and transcriber is None and not needed:
+        return FoundPhones(PhoneTrack.unknown(len(audio) / rate), (), (), UNSOUGHT)
     if text is None:
         return _heard(audio, rate) if transcriber is None else _transcribed(audio, rate, transcriber, language)
     spoken = code_of(language) if language is not None else language_of(text)

@@ -47,6 +47,12 @@ class Cast:
         return tuple(one for one in (self.mouth, self.head, self.eyes) if one is not None)
 
     @property
+    def needs_phones(self) -> bool:
+        """Whether any of them must be told what is said."""
+        everybody = (*self.members, self.expression)
+        return any(one is not None and one.needs_phones for one in everybody)
+
+    @property
     def emotions(self) -> tuple[str, ...]:
         """Those that can be felt."""
         return (self.expression or self.mouth).emotions

@@ -78,13 +78,14 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         for remark in encoding_remark(words) if text is not None else ():
             tell(f"warning: {remark}")
     if cast.detector is not None:
-        heard = hear(recording, text=text, phones_path=phones, **_as_asked(request))
+        heard = hear(recording, text=text, phones_path=phones, phones_needed=cast.needs_phones, **_as_asked(request))
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
     emotion = request.emotion or (None if request.emotions else cast.emotions[0])
     heard = hear(
         recording,
         text=text,
         phones_path=phones,
+        phones_needed=cast.needs_phones,
         **_as_asked(request),
         emotion=emotion,
         emotions_path=request.emotions,

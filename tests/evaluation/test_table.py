@@ -83,10 +83,30 @@ def test_markdown_gives_units_directions_intervals_and_reasons():
     lines = text.splitlines()
     assert lines[0] == "| method | lve (mm) ↓ | fdd (mm) → 0 | emotion_accuracy ↑ | rtf ↓ |"
     assert lines[2].startswith("| good | 2.00 [")
-    assert lines[3] == "| poor | 4.00 (3 of 4) | — | — | — |"
+    alike = lines[lines.index("On the 3 of 4 utterances of poor:") :]
+    assert alike[2] == "| method | lve (mm) ↓ | fdd (mm) → 0 | emotion_accuracy ↑ |"
+    assert alike[4].startswith("| good | 2.00 [1.00, 3.00] |"), "of the same three: 1, 3 and 2"
+    assert alike[5] == "| poor | 4.00 | — | — |"
     assert "— fdd: no rest (good, poor)" in lines
     assert "— rtf: no clock (poor)" in lines
     assert "The recordings themselves: emotion accuracy 1.00, unweighted average recall 1.00." in lines
+
+
+def test_no_table_has_rows_of_different_utterances():
+    rows = (
+        Row("whole", {"lve": (1, 2, 3, 9)}),
+        Row("few", {"lve": (4, NAN, NAN, NAN)}),
+        Row("some", {"lve": (4, 5, NAN, NAN)}),
+        Row("none"),
+    )
+    found = Comparison(COLUMNS[:1], tuple("abcd"), rows, 0).tables()
+    assert [(title, [row.label for row in one.rows]) for title, one in found] == [
+        ("", ["whole", "none"]),
+        ("On the 1 of 4 utterances of few:", ["whole", "few", "some"]),
+        ("On the 2 of 4 utterances of some:", ["whole", "some"]),
+    ]
+    assert [one.scores["whole"]["lve"].mean for _, one in found] == [3.75, 1, 1.5]
+    assert all(score["lve"].whole for _, one in found[1:] for score in one.scores.values())
 
 
 def test_markdown_of_chosen_figures():

@@ -36,7 +36,7 @@ def write_account(corpus: Corpus, givens: Iterable[Given], paths: Iterable[str |
     names = _Names(corpus, paths)
     for given in givens:
         if given.recording.name not in report.refused:
-            rows[given.recording.name] = _used(corpus.record(given.id), given, report)
+            rows[given.recording.name] = _used(corpus, corpus.record(given.id), given, report)
     for name, why in report.refused.items():
         rows[name] = {**dict.fromkeys(COLUMNS, ""), "recording": name, "used": "no", "why": names.without_places(why)}
     text = io.StringIO()
@@ -46,21 +46,23 @@ def write_account(corpus: Corpus, givens: Iterable[Given], paths: Iterable[str |
     write_text(account_path(corpus), text.getvalue())
 
 
-def phones_from(record: Record) -> str:
+def phones_from(corpus: Corpus, record: Record) -> str:
     """Where an utterance's phones come from."""
     if not record.aligned_hash:
         return "given"
+    if record.id in corpus.subset([record.id]).without_phones():
+        return "not looked for"
     return "aligned to the words" if record.text else "recognised by ear"
 
 
-def _used(record: Record, given: Given, report: AddReport) -> Row:
+def _used(corpus: Corpus, record: Record, given: Given, report: AddReport) -> Row:
     files = [f"{path.resolve().parent.name}/{path.name}" for path in given.files()]
     return {
         "recording": given.recording.name,
         "id": record.id,
         "used": "yes" if record.usable else "no",
         "why": report.kept.get(record.id, record.reason),
-        "phones": phones_from(record),
+        "phones": phones_from(corpus, record),
         "files": "; ".join(files),
         "remarks": "; ".join(remark.strip() for remark in record.remarks.split("|") if remark.strip()),
     }

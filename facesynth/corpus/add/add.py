@@ -47,6 +47,7 @@ def add(
     transcriber: Path | None = None,
     emotions: Path | None = None,
     face: int | None = None,
+    placing: bool = True,
     replacing: bool = False,
     workers: Workers = ALONE,
 ) -> AddReport:
@@ -56,8 +57,9 @@ def add(
     these names; texts: what is said, by name (else the tables among the files say it). phones, emotions: files of the
     one recording that is added. speaker: whose phones are taken of files that hold those of several. language: of the
     texts; found out otherwise. transcriber: folder of a model that writes down what nobody did. face: which one is captured
-    from video with several, counted from the left. workers: who reads, captures and aligns; the corpus is the same whoever
-    does.
+    from video with several, counted from the left. placing: whether phones are placed where none are given; methods that hear
+    the sound alone need none, and `align` places them later. workers: who reads, captures and aligns; the corpus is the same
+    whoever does.
 
     Recordings that are there already are passed over, so an interrupted run can be repeated. Of those of which something
     is given otherwise than before only that is done anew; what is not given this time stays, and so do phones that were
@@ -72,7 +74,7 @@ def add(
     givens = []
     for found in recordings:
         recording = replace(found, phones=phones or found.phones, emotions=emotions or found.emotions)
-        recording = replace(recording, speaker=speaker, language=language, transcriber=transcriber)
+        recording = replace(recording, speaker=speaker, language=language, transcriber=transcriber, placed=placing)
         facts = {**about, **(listed or {}).get(recording.name, {})}
         try:
             givens.append(_given(recording, facts, tables.texts, face))

@@ -27,7 +27,7 @@ from facesynth.inference.speech import EmotionTrack, Speech
 from facesynth.motion.planar import is_tracked
 from facesynth.speech.audio import as_saved, load_audio, read_sound
 from facesynth.speech.emotions import read_emotions
-from facesynth.speech.phone_sources import PLACED
+from facesynth.speech.phone_sources import PLACED, UNSOUGHT
 from facesynth.speech.segments import Segment
 from facesynth.speech.textgrid import read_textgrid, write_textgrid
 
@@ -71,7 +71,7 @@ class Prepared:
     """None where it stays."""
     words: tuple[Segment, ...] = ()
     aligned: bool = False
-    """Whether a program placed the phones."""
+    """Whether a program placed the phones, or nobody did: `align` may place them."""
     remarks: tuple[str, ...] = ()
     parts: frozenset[Part] = frozenset(PARTS)
     changed: tuple[str, ...] = ()
@@ -225,18 +225,19 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
     heard = hear_sound(
         take.stored,
         take.sample_rate,
-        text=record.text or None,
+        text=record.text or None if recording.placed else None,
         language=recording.language,
         transcriber=recording.transcriber,
         phones_path=recording.phones,
         speaker=recording.speaker,
+        phones_needed=recording.placed,
     )
     guessed = encoding_remark(recording.text) if recording.text is not None and record.text else ()
     return replace(heard, warnings=(*guessed, *heard.warnings))
 
 
 def _is_aligned(heard: Heard | None) -> bool:
-    return heard is not None and heard.source in PLACED
+    return heard is not None and heard.source in (*PLACED, UNSOUGHT)
 
 
 def _emotions(corpus: Corpus, record: Record, recording: Recording, duration_s: float) -> EmotionTrack:

@@ -51,6 +51,8 @@ class Recording:
     """Of the text (ISO 639-1); found out otherwise."""
     transcriber: Path | None = None
     """Folder of a model that writes down what is said, where no words are given."""
+    placed: bool = True
+    """Whether phones are placed where none are given; otherwise they stay unknown."""
 
 
 def find_recordings(paths: Iterable[str | Path]) -> tuple[list[Recording], dict[str, str]]:

@@ -81,7 +81,7 @@ def _utterance_problems(files: Files, header: Header, record: Record) -> tuple[l
         problems, f"motion/{name}.npz", "restore it, or add the recording again", lambda: read_motion(files.motion(name), header)
     )
     if motion is not None:
-        problems += motion_problems(f"motion/{name}.npz", name, motion, phones)
+        problems += motion_problems(f"motion/{name}.npz", name, motion, phones if phones and phones.known else None)
     problems += _emotion_problems(files, header, record, phones)
     problems += _length_problems(name, sound_s, phones, motion)
     return problems, 0 if phones is None else len(phones)

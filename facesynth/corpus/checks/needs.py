@@ -31,21 +31,28 @@ class Need:
 
 def lacking(files: Files, records: Iterable[Record], needs: Sequence[Need]) -> Iterator[Problem]:
     """Notes on methods for which there is too little to learn from, and on emotions that are too rare."""
-    minutes, counts, takes = 0.0, defaultdict[str, Counter[str]](Counter), Counter[str]()
+    minutes, counts, takes, unknown = 0.0, defaultdict[str, Counter[str]](Counter), Counter[str](), list[str]()
     for record in records:
         if not record.usable:
             continue
         with suppress(FacesynthError, OSError):
             phones, _ = read_textgrid(files.phones(record.id))
             minutes += phones.duration_s / 60
-            counts[record.emotion].update(phones.labels)
             takes[record.emotion] += 1
+            if phones.known:
+                counts[record.emotion].update(phones.labels)
+            else:
+                unknown.append(record.id)
     if not takes:
         return
     short = [f"{need.method} ({need.minutes:g})" for need in needs if minutes < need.minutes]
     if short:
         do = "record more; `facesynth corpus stats` says which sentences would add most"
         yield Problem("utterances.csv", f"{minutes:.1f} minutes are little for {', '.join(short)}", do, grave=False)
+    if unknown:
+        what = f"nobody knows what is said in {len(unknown)} recordings ({', '.join(unknown[:3])}{'…' * (len(unknown) > 3)})"
+        do = "`facesynth corpus align` places phones; methods that hear the sound alone need none"
+        yield Problem("phones", what, do, grave=False)
     for need, (emotion, heard) in product(needs, counts.items()):
         few = [phone for phone in PHONES if phone not in RARE and heard[phone] < need.of_each_phone]
         if few:

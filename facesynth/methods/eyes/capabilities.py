@@ -6,6 +6,7 @@ CAPABILITIES = Capabilities(
     "eyes",
     "Deng 2006: lids and gaze, grown together from patches of recorded ones",
     home="facesynth.methods.eyes.method",
+    needs_phones=False,
     part="eyes",
     abilities=frozenset({Accounting, Looking}),
     minutes=1.0,

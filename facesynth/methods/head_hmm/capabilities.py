@@ -6,6 +6,7 @@ CAPABILITIES = Capabilities(
     "head_hmm",
     "head turns from prosody, by a hidden Markov model for each cluster of rotations (Deng 2006, §4.4)",
     home="facesynth.methods.head_hmm.method",
+    needs_phones=False,
     part="head",
     minutes=2.0,
     exporter="facesynth.export.head:hmm_content",

@@ -8,6 +8,7 @@ CAPABILITIES = Capabilities(
     "head_knn",
     "head motion from the nearest recorded movements, through key poses (Deng 2006, §4.3)",
     home="facesynth.methods.head_knn.method",
+    needs_phones=False,
     part="head",
     options=(
         Option(

@@ -85,6 +85,11 @@ class Network(Method):
         self.predictor = PosePredictor(features, phones=phones, look_ahead_s=ahead, voices=voices, unsaid=unsaid)
         self.residual = Residual() if residual > 0 else None
 
+    @property
+    def needs_phones(self) -> bool:
+        """Unless sound alone was what it learned from."""
+        return bool(self.config["phones"])
+
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Learn from the complete frames of a corpus."""
         self.learned_from(corpus)
