@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from facesynth.corpus import Corpus
+    from facesynth.corpus.workers import Workers
     from facesynth.evaluation.compare import Evaluation
     from facesynth.evaluation.contestants import Contestant, Family
     from facesynth.evaluation.folds import Fold

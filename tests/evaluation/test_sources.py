@@ -36,7 +36,7 @@ def talking(path, sentences, layout=LAYOUT, gap=gap_of):
         audio = rng.normal(0, 0.1, 32000).astype(np.float32)
         speech = Speech(audio, 16000, TRACK, EmotionTrack.constant("neutral", 2.0), " ".join(w for w, _, _ in said))
         motion = replace(face(gap(words), fps=FPS), layout=layout)
-        corpus.add_utterance(Record(f"u{number}"), speech, motion, said)
+        corpus.add_utterance(Record(f"u{number}", text=speech.text), speech, motion, said)
     return Corpus.open(path)
 
 
