@@ -1,4 +1,4 @@
-"""Settings of eFASE beside each other on clips that `facesynth tune` did not choose by, from a larger database than it searched on.
+"""Settings of eFASE beside each other on clips that `facesynth tune` did not choose by, from larger databases than it searched.
 
     python benchmarks/efase_settings.py SETTINGS.yaml... --corpora CORPUS... --limit 100
 
@@ -6,16 +6,19 @@ The tested clips are those that `facesynth tune` tests on with the same --senten
 """
 
 import argparse
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from facesynth.config import load_config
-from facesynth.corpus import Corpus
+from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve, marker_error
 from facesynth.evaluation.lips import closure_rate, closure_threshold, require_parting
 from facesynth.evaluation.pair import UnavailableError
+from facesynth.inference.motion import Motion
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.tuning import RANGES, split_for_tuning
 from facesynth.methods.efase.tuning_search import ChangingSettings
@@ -31,10 +34,8 @@ def main() -> None:
     parser.add_argument("--test", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
-    print(
-        "| corpus, nodes | settings | marker error | `lve` | closure rate | energy ratio |\n|---|---|---:|---:|---:|---:|",
-        flush=True,
-    )
+    print("| corpus, nodes | settings | marker error | `lve` | energy ratio | closure rate |")
+    print("|---|---|---:|---:|---:|---:|", flush=True)
     for path in asked.corpora:
         database, _, test = split_for_tuning(Corpus.open(path), asked.sentences, asked.test, asked.seed)
         count = min(asked.limit, len(database))
@@ -46,23 +47,28 @@ def main() -> None:
 
 
 def figures(changing: ChangingSettings, settings: dict[str, float], test: Corpus) -> list[str]:
-    """Means over the tested clips."""
+    """Means over the tested clips; a dash where a layout or its recordings do not tell."""
     speaker = changing.speaker({name: settings[name] for name in RANGES})
     pairs = [(speaker.synthesize(u.speech), u) for u in test]
-    shut = "—"
-    try:
-        threshold = closure_threshold((u.motion, u.speech.phones) for _, u in pairs)
-        require_parting((u.motion for _, u in pairs), threshold)
-        shut = f"{np.mean([closure_rate(made, u.speech.phones, threshold) for made, u in pairs if says_closure(u)]):.2f}"
-    except UnavailableError:
-        pass
-    errors = [np.mean([measure(made, u.motion) for made, u in pairs]) for measure in (marker_error, lve, energy_ratio)]
-    return [f"{errors[0]:.3f}", f"{errors[1]:.2f}", shut, f"{errors[2]:.2f}"]
+
+    def mean(measure: Callable[[Motion, Utterance], float], some: Sequence[tuple[Motion, Utterance]] = pairs) -> str:
+        try:
+            return f"{np.mean([measure(made, u) for made, u in some]):.3g}"
+        except UnavailableError:
+            return "—"
+
+    def shut(made: Motion, u: Utterance) -> float:
+        threshold = closure_threshold((one.motion, one.speech.phones) for _, one in pairs)
+        require_parting((one.motion for _, one in pairs), threshold)
+        return closure_rate(made, u.speech.phones, threshold)
+
+    plain = [partial(compared, measure) for measure in (marker_error, lve, energy_ratio)]
+    return [*map(mean, plain), mean(shut, [pair for pair in pairs if {"p", "b", "m"} & set(pair[1].speech.phones.labels)])]
 
 
-def says_closure(utterance) -> bool:
-    """Whether a p, b or m is said."""
-    return bool({"p", "b", "m"} & set(utterance.speech.phones.labels))
+def compared(measure: Callable[[Motion, Motion], float], made: Motion, utterance: Utterance) -> float:
+    """A figure of two motions, the recorded one being the utterance's."""
+    return measure(made, utterance.motion)
 
 
 if __name__ == "__main__":
