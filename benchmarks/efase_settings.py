@@ -7,6 +7,7 @@ The tested clips are those that `facesynth tune` tests on with the same --senten
 
 import argparse
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -52,10 +53,11 @@ def figures(changing: ChangingSettings, settings: dict[str, float], test: Corpus
     pairs = [(speaker.synthesize(u.speech), u) for u in test]
 
     def mean(measure: Callable[[Motion, Utterance], float], some: Sequence[tuple[Motion, Utterance]] = pairs) -> str:
-        try:
-            return f"{np.mean([measure(made, u) for made, u in some]):.3g}"
-        except UnavailableError:
-            return "—"
+        known = []
+        for made, u in some:
+            with suppress(UnavailableError):
+                known.append(measure(made, u))
+        return f"{np.mean(known):.3g}" if known else "—"
 
     def shut(made: Motion, u: Utterance) -> float:
         threshold = closure_threshold((one.motion, one.speech.phones) for _, one in pairs)

@@ -73,7 +73,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class TestErrors:
+class ErrorsOnOthers:
     """Mean errors of one corpus on sentences that nothing was chosen by, squared unit of its layout."""
 
     performer: str
@@ -96,7 +96,7 @@ class Tuning:
     evaluations: int
     tuning_sentences: tuple[tuple[str, ...], ...]
     """Of each corpus."""
-    tested: tuple[TestErrors, ...]
+    tested: tuple[ErrorsOnOthers, ...]
     """Of each corpus."""
 
 
@@ -203,14 +203,15 @@ def _errors(
     return [np.array([kept.error(row, of.performer) for of in recordings]) for row in rows]
 
 
-def _tested(recordings: Sequence[Recordings], found: Mapping[str, float], workers: Workers) -> Iterator[TestErrors]:
+def _tested(recordings: Sequence[Recordings], found: Mapping[str, float], workers: Workers) -> Iterator[ErrorsOnOthers]:
     rows = (tuple(found.items()), (), tuple(PUBLISHED.items()))
     jobs = [Job(row, of, of.test) for of in recordings for row in rows]
     errors = list(spread(errors_of, jobs, workers, "test sentences"))
     for number, of in enumerate(recordings):
         mine, default, published = (np.array(row) for row in errors[3 * number : 3 * number + 3])
-        means = (float(row.mean()) for row in (mine, default, published))
-        yield TestErrors(of.performer, of.test, *means, int((mine < default).sum()), int((mine > default).sum()))
+        found_mean, default_mean, published_mean = (float(row.mean()) for row in (mine, default, published))
+        nearer, farther = int((mine < default).sum()), int((mine > default).sum())
+        yield ErrorsOnOthers(of.performer, of.test, found_mean, default_mean, published_mean, nearer, farther)
 
 
 @contextmanager
