@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats
@@ -30,7 +31,7 @@ class Beside:
 
     def mixed(self, frames: Floats, speech: Speech) -> Floats:
         """[T, C] the mean of frames [T, C] and what it says of the same speech."""
-        other: Floats = self.synthesize(speech).frames
+        other = self.synthesize(speech).frames.astype(np.float64)
         return frames + self.share * (other - frames)
 
 
