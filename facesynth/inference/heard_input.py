@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .ear import RATE
 from .expectation import BANDS_FPS, linear_at
 from .folder import Folder
-from .heard import HOP, RATE, Listening, exported_listening
+from .heard import HOP, Listening, exported_listening
 
 SIDE_S = 0.2
 """How far before and after a frame the sound is heard, s."""
