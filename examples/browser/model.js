@@ -89,6 +89,7 @@ export async function run(graph, inputs, ort) {
 // Sound at the model's rate to frames [T * C], by the deterministic part of the system.
 export async function speak(lds, audio, ort) {
   const { manifest, graphs } = lds;
+  if (!graphs.features) throw new Error("this system hears with a network; export one that was trained with hears=periodogram");
   const { window_samples: length, lead_ms, states, components } = manifest.settings;
   const count = Math.round((audio.length / manifest.sample_rate) * manifest.fps);
   const windows = new Float32Array(count * length);

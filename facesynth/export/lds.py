@@ -24,12 +24,14 @@ def lds_content(model: LDS) -> Content:
             "about": "frame t is final when the sound up to t / fps + look_ahead_s is known; streaming equals the whole",
         },
         sample_rate=RATE,
-        arrays={} if model.heard is None else {f"heard_{name}": getattr(model.heard, name).cpu().numpy() for name in ARRAYS},
+        arrays={}
+        if model.listener is None
+        else {f"heard_{name}": getattr(model.listener, name).cpu().numpy() for name in ARRAYS},
     )
 
 
 def _hearing(model: LDS) -> tuple[Graph, ...]:
-    return (features_graph(model),) if model.heard is None else hearing_graphs(model.heard.hearing)
+    return (features_graph(model),) if model.listener is None else hearing_graphs(model.listener.hearing)
 
 
 def features_graph(model: LDS) -> Graph:

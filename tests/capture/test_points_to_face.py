@@ -57,7 +57,15 @@ def studio(tmp_path_factory):
             run(corpus_group, "add", folder / "actor", folder / "clips", "--points", "--box", PLACE, "--jobs", 1, "--json")
         )
     model = folder / "actor.safetensors"
-    settings = ("features=2", "components=2", "lead_ms=0", "deterministic_order=2", "stochastic_order=2", "rows=4")
+    settings = (
+        "hears=periodogram",
+        "features=2",
+        "components=2",
+        "lead_ms=0",
+        "deterministic_order=2",
+        "stochastic_order=2",
+        "rows=4",
+    )
     trained = run(train, "lds", folder / "actor", *settings, "-o", model)
     return folder, added, model, trained
 

@@ -7,7 +7,15 @@ from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 
-QUICK = {"features": 2, "components": 2, "rows": 4, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
+QUICK = {
+    "hears": "periodogram",
+    "features": 2,
+    "components": 2,
+    "rows": 4,
+    "lead_ms": 0,
+    "deterministic_order": 2,
+    "stochastic_order": 2,
+}
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,15 @@ def long_sound(speeches):
 def lds_file(small_corpus, tmp_path_factory):
     from facesynth.methods.lds.method import LDS
 
-    quick = {"features": 4, "components": 4, "rows": 6, "lead_ms": 40, "deterministic_order": 2, "stochastic_order": 2}
+    quick = {
+        "hears": "periodogram",
+        "features": 4,
+        "components": 4,
+        "rows": 6,
+        "lead_ms": 40,
+        "deterministic_order": 2,
+        "stochastic_order": 2,
+    }
     path = tmp_path_factory.mktemp("models") / "lds.safetensors"
     LDS(**quick).fit(small_corpus).save(path)
     return path

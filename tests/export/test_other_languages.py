@@ -45,7 +45,15 @@ def talking_head(rig, tmp_path_factory):
         weights[:, rig.index("mouthSmileLeft", "mouthSmileRight")] = 0.1 * rng.uniform(0, 1, (90, 1))
         frames = pose_points(rig, marker_vertices(rig, layout), weights).reshape(90, -1)
         corpus.add_utterance(Record(f"c{clip}", sentence=f"c{clip}"), spoken(loudness, rng), Motion(frames, FPS, layout))
-    quick = {"features": 4, "components": 2, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
+    quick = {
+        "hears": "periodogram",
+        "features": 4,
+        "components": 2,
+        "rows": 6,
+        "lead_ms": 0,
+        "deterministic_order": 2,
+        "stochastic_order": 2,
+    }
     LDS(**quick).fit(corpus).save(home / "lds.safetensors")
     save_wav(home / "speech.wav", spoken(np.array([0, 1, 0.2, 0.8, 0.1, 1, 0]), rng).audio, RATE)
     return home / "lds.safetensors", home / "speech.wav"

@@ -25,7 +25,7 @@ def corpus(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def model(corpus):
-    return LDS(hears="both", deterministic_order=3, stochastic_order=2).fit(corpus, seed=0)
+    return LDS(deterministic_order=3, stochastic_order=2).fit(corpus, seed=0)
 
 
 def streamed(speaker, sound, cuts, **options):
@@ -87,6 +87,18 @@ def test_it_streams_the_same_however_the_sound_is_cut_and_no_later_than_it_says(
     assert len(model.stream().finish()) == 0
     with pytest.raises(FacesynthError, match=r"model\.stream\(\)"):
         model.speaker().advance(model.speaker().start(), sound)
+
+
+def test_a_model_from_before_there_was_a_choice_hears_as_it_did(corpus, tmp_path):
+    model = LDS(hears="periodogram", deterministic_order=2, stochastic_order=2).fit(corpus)
+    speech = corpus[corpus.ids[0]].speech
+    wanted = model.synthesize(speech).frames
+    del model.config["hears"]
+    model.save(tmp_path / "m.safetensors")
+    again = LDS.load(tmp_path / "m.safetensors")
+    assert again.config["hears"] == "both"
+    assert np.array_equal(again.synthesize(speech).frames, wanted)
+    assert again.listener is None
 
 
 def test_what_it_cannot_hear_is_refused():

@@ -27,7 +27,15 @@ from facesynth.methods.lds.system import Clip
 from facesynth.methods.registry import load
 from facesynth.speech.periodogram import Periodogram
 
-QUICK = {"features": 4, "components": 4, "rows": 6, "lead_ms": 0, "deterministic_order": 2, "stochastic_order": 2}
+QUICK = {
+    "hears": "periodogram",
+    "features": 4,
+    "components": 4,
+    "rows": 6,
+    "lead_ms": 0,
+    "deterministic_order": 2,
+    "stochastic_order": 2,
+}
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +72,7 @@ def said(audio, rate):
 
 def test_the_default_choices_beat_the_mean_pose(driven):
     train, test = driven.subset(driven.ids[:9]), driven.subset(driven.ids[9:])
-    model = LDS(features=2, components=2).fit(train)
+    model = LDS(hears="periodogram", features=2, components=2).fit(train)
     mean = np.concatenate([utterance.motion.frames for utterance in train]).mean(axis=0)
     for utterance in test:
         truth = utterance.motion.frames
@@ -73,7 +81,7 @@ def test_the_default_choices_beat_the_mean_pose(driven):
 
 
 def test_one_step_prediction_beats_no_change(driven):
-    facts = LDS(features=2, components=2, lead_ms=0).fit(driven).facts
+    facts = LDS(hears="periodogram", features=2, components=2, lead_ms=0).fit(driven).facts
     assert min(facts["stochastic_order"]["errors"]) < facts["no_change_error"]
 
 
@@ -101,7 +109,7 @@ def test_noise_moves_samples_away_from_the_deterministic_part_in_proportion(corp
 
 def test_a_sample_is_nearer_than_the_mean_pose(driven):
     train, test = driven.subset(driven.ids[:9]), driven.subset(driven.ids[9:])
-    model = LDS(features=8, components=2).fit(train)
+    model = LDS(hears="periodogram", features=8, components=2).fit(train)
     mean = np.concatenate([utterance.motion.frames for utterance in train]).mean(axis=0)
     for utterance in test:
         truth = utterance.motion.frames
@@ -292,7 +300,7 @@ def test_thirty_frames_are_refused_with_how_many_are_needed(corpus, tmp_path):
     speech = said(one.speech.audio[:8_000], 16_000)
     short.add_utterance(Record("only"), speech, Motion(one.motion.frames[:30], 60, corpus.layout))
     with pytest.raises(FacesynthError, match=r"at least \d+ frames are needed"):
-        LDS().fit(short)
+        LDS(hears="periodogram").fit(short)
 
 
 @pytest.mark.parametrize("what", ["sound", "motion"])

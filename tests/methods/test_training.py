@@ -32,7 +32,7 @@ class Guess(Method):
 def test_the_config_is_the_constructors_arguments_with_their_defaults():
     assert Guess().config == {"number": 1, "sure": False}
     assert Guess(3).config == {"number": 3, "sure": False}
-    assert Tcn(steps=5).config == {"components": 25, "steps": 5, "features": "log_mel"}
+    assert Tcn(steps=5).config == {"components": 25, "steps": 5, "features": "both"}
     assert copy.deepcopy(Ridge(components=4)).config == {"components": 4, "features": "both"}
     with pytest.raises(TypeError, match="numbr"):
         Guess(numbr=3)

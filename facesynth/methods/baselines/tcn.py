@@ -22,8 +22,8 @@ from facesynth.motion.pca import Pca
 
 @register(TCN)
 class Tcn(Method):
-    """Four 1-D convolutions, 128 wide, kernel 5, dilation up to 2, dropout 0.3, from log-mel bands (or other features, see
-    `Hearing`) to 25 components.
+    """Four 1-D convolutions, 128 wide, kernel 5, dilation up to 2, dropout 0.3, from log-mel bands and a layer of the
+    phone network (or one of them, see `Hearing`) to 25 components.
 
     AdamW on the squared error over random windows, the learning rate falling along a cosine. The same seed gives the
     same weights on the same machine with the same number of threads.
@@ -32,7 +32,7 @@ class Tcn(Method):
     scale: Tensor
     """[1] standard deviation of the first component, unit of the layout."""
 
-    def __init__(self, components: int = 25, steps: int = STEPS, features: Features = "log_mel") -> None:
+    def __init__(self, components: int = 25, steps: int = STEPS, features: Features = "both") -> None:
         super().__init__()
         if steps < 1:
             raise FacesynthError(f"tcn needs at least one step of training; got {steps}")

@@ -82,7 +82,7 @@ class LDS(Method):
     def __init__(
         self,
         *,
-        hears: Hears = "periodogram",
+        hears: Hears = "both",
         scale: Scale = "log",
         context_ms: float = 200.0,
         features: float = 24,
@@ -169,20 +169,25 @@ class LDS(Method):
             features=part(self.features_of, device),
             innovations=part(lambda uniform: (self.innovations(uniform),), device),
             rollout=part(self.frames_of, device),
-            heard=None if self.heard is None else self.heard.input(self.fps),
+            heard=None if self.listener is None else self.listener.input(self.fps),
         )
 
     @property
     def settings(self) -> LdsSettings:
         """Sizes and times of the trained system."""
         components, states = len(self.shape.scale), len(self.rollout.A)
-        features = len(self.features.scale if self.heard is None else self.heard.bias)
+        features = len(self.features.scale if self.listener is None else self.listener.bias)
         periodogram, amounts = self.periodogram, self.facts.get("noise_amounts", dict.fromkeys(STATES, 1.0))
         gap, along = self.facts.get("closed_gap"), self.facts.get("closing")
         closing = None if along is None else tuple(along)
         return LdsSettings(
             periodogram.length, periodogram.lead_ms, SETTLING_S, features, components, states, amounts, gap, closing
         )
+
+    @property
+    def listener(self) -> HeardRegression | None:
+        """What it hears with in place of a periodogram; models from before there was a choice have learned none."""
+        return self.heard if self.heard is not None and self.heard.bias.numel() else None
 
     @property
     def periodogram(self) -> Periodogram:
@@ -205,8 +210,8 @@ class LDS(Method):
 
     def encode(self, speech: Speech, count: int) -> Tensor:
         """The system's input [count, m] for an utterance."""
-        if self.heard is not None:
-            return torch.from_numpy(self.heard.input(self.fps).at(self.heard.hearing.bands(speech), 0, count))
+        if self.listener is not None:
+            return torch.from_numpy(self.listener.input(self.fps).at(self.listener.hearing.bands(speech), 0, count))
         return self.features.encode(self.periodogram.of(speech, count))
 
     def _clips(self, pieces: list[Piece], lead_ms: float) -> list[Clip]:
