@@ -22,7 +22,7 @@ from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
 from facesynth.methods.efase.method import Efase
-from facesynth.methods.learn import expectation
+from facesynth.methods.learn.linear_path import LinearPath
 from facesynth.methods.learn.point_loss import lip_points
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.methods.network.method import Network
@@ -72,7 +72,7 @@ def of_regression(network: Network, some: Corpus) -> Iterator[tuple[float, Motio
     """Each share of the regression, and the motions with it: frames are linear in it."""
     ends = []
     for share in (0.0, 1.0):
-        with patch.object(expectation, "SHARE", share):
+        with patch.object(LinearPath, "share", share):
             ends.append({u.id: network.synthesize(u.speech) for u in some})
     for share in OF_REGRESSION:
         yield (

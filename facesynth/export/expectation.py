@@ -16,7 +16,7 @@ from facesynth.inference.residual import ARRAYS
 from facesynth.methods.efase.audio import PhoneSound
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Hearing
-from facesynth.methods.learn.linear_path import SHARE, SIDE, LinearPath
+from facesynth.methods.learn.linear_path import SIDE, LinearPath
 from facesynth.methods.learn.pose_network import REACH, CausalBlock
 from facesynth.methods.learn.residual import Residual
 
@@ -35,7 +35,8 @@ def expectation_graph(predictor: PosePredictor, unit: str) -> Graph:
         value = b.op("Add", value, _changed(b, value, block))  # type: ignore[arg-type]  # all of them are CausalBlock
     components = _causal(b, value, network.poses)
     if predictor.linear.learned:
-        own, straight = b.constant(np.float32(1 - SHARE)), b.constant(np.float32(SHARE))
+        share = predictor.linear.share
+        own, straight = b.constant(np.float32(1 - share)), b.constant(np.float32(share))
         linear = _linear(b, heard.name, reading.width, predictor.linear, predictor.ahead)
         components = b.op("Add", b.op("Mul", components, own), b.op("Mul", linear, straight))
     poses = b.op("Transpose", components, perm=[0, 2, 1])

@@ -74,6 +74,13 @@ def test_each_emotion_has_poses_of_its_own():
     np.testing.assert_allclose(found[inside], some[0].poses[inside], atol=0.15)
 
 
+def test_it_counts_half_where_there_are_several_emotions():
+    calm, moved = LinearPath(), LinearPath()
+    calm.learn([recording(np.ones((BANDS, 1), np.float32), 0)], READING, 3)
+    moved.emotions = torch.zeros(2, 1)
+    assert (calm.share, moved.share) == (0.4, 0.2)
+
+
 def test_it_says_nothing_before_it_has_learned():
     assert not LinearPath().learned
 

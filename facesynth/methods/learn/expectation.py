@@ -20,7 +20,7 @@ from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
 from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
-from facesynth.methods.learn.linear_path import SHARE, LinearPath
+from facesynth.methods.learn.linear_path import LinearPath
 from facesynth.methods.learn.other_voices import other_voice
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
@@ -172,7 +172,7 @@ class PosePredictor(nn.Module):
         """[F, W] what the network is told to coordinates [F, D]."""
         components = self.network(told[None])[0][0]
         if self.linear.learned:
-            components = components.lerp(self.linear(told, self.ahead), SHARE)
+            components = components.lerp(self.linear(told, self.ahead), self.linear.share)
         poses: Tensor = components @ self.into + self.onto
         return poses
 

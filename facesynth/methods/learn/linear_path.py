@@ -19,6 +19,8 @@ from facesynth.methods.learn.windows import Recording
 
 SHARE = 0.4
 """How much of the pose is the regression's; the network's is the rest."""
+AMONG_EMOTIONS = 0.5
+"""What that is multiplied by where there are several emotions: they change how a sound is said, which it cannot know."""
 SIDE = 5
 """Frames of the sound on either side of a frame that are heard, as far as may be looked ahead."""
 PENALTIES = 10.0 ** np.arange(-3, 2.1, 0.5)
@@ -47,6 +49,11 @@ class LinearPath(nn.Module):
     def learned(self) -> bool:
         """Whether it says anything."""
         return self.bias.numel() > 0
+
+    @property
+    def share(self) -> float:
+        """How much of the pose is the regression's."""
+        return SHARE * (AMONG_EMOTIONS if len(self.emotions) else 1.0)
 
     def forward(self, told: Tensor, ahead: int) -> Tensor:
         """[F, W] what the network is told, `ahead` frames early, to components [F, R]."""
