@@ -5,6 +5,7 @@ python benchmarks/containers.py
 
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "reports"))
@@ -32,9 +33,15 @@ def main() -> None:
                 if suffix == "avi" and name in UNTIMED:
                     cells.append("")
                     continue
-                path = write(Path(folder) / f"clip.{suffix}", clip)
-                cells.append(f"{1000 * largest_error_s(path, clip):.1f}")
+                played = as_long(clip) if suffix == "avi" else clip
+                path = write(Path(folder) / f"clip.{suffix}", played)
+                cells.append(f"{1000 * largest_error_s(path, played):.1f}")
             print(f"| {suffix} | {' + '.join(codecs)} | " + " | ".join(cells) + " |")
+
+
+def as_long(clip: Clip) -> Clip:
+    """With pictures up to the end of the sound: what outlasts them looks like a recorder that lays its sound down late."""
+    return replace(clip, pictures_s=at_30_fps(clip.duration_s + sum(by for _, by in clip.moved)))
 
 
 if __name__ == "__main__":

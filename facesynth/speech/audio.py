@@ -200,7 +200,8 @@ def _read_plain(path: Path) -> Recorded | None:
         with ExitStack() as opened:
             stored = opened.enter_context(open(path, "rb"))
             source, remarks = _mended(opened, stored)
-            with soundfile.SoundFile(source) as file:
+            # by its path where it needs no mending: libsndfile seeks before the beginning of damaged files
+            with soundfile.SoundFile(path if source is stored else source) as file:
                 audio = one_channel(partial(_blocks, file))
                 layer = LAYERS.get(file.subtype, "mp3")
                 rate, priming = int(file.samplerate), _priming(stored, layer) if file.format in MPEG else 0

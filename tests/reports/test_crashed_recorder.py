@@ -8,6 +8,7 @@ import pytest
 import soundfile
 
 from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
 from facesynth.inference.wav import find_samples, read_wav
 from facesynth.speech.audio import load_audio, read_sound
 
@@ -154,3 +155,35 @@ def test_aiff_and_au_that_are_whole_are_read_as_they_are(tmp_path, kind):
         path.write_bytes(content)
         sound = read_sound(path)
         assert (len(sound.audio), sound.remarks) == (len(SOUND), ())
+
+
+def damaged(rng, content):
+    """A file cut off, with a number or some bytes of its header changed, or with bytes put in."""
+    kind = rng.integers(4)
+    if kind == 0:
+        return content[: rng.integers(4, len(content))]
+    changed = bytearray(content)
+    if kind == 1:
+        number = int(rng.choice([0, 1, 0x7FFFFFFF, 0xFFFFFFFF, rng.integers(1 << 16), rng.integers(1 << 32)]))
+        struct.pack_into(">I", changed, 4 * int(rng.integers(16)), number)
+    elif kind == 2:
+        for place in rng.integers(4, 80, 5):
+            changed[place] = rng.integers(256)
+    else:
+        changed[80:80] = rng.bytes(int(rng.integers(200)))
+    return bytes(changed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["AIFF", "AU"])
+def test_damaged_aiff_and_au_end_in_sound_or_one_line(tmp_path, capfd, kind):
+    rng, path = np.random.default_rng(18), tmp_path / "a.aif"
+    soundfile.write(path, SOUND[:8000], RATE, format=kind, subtype="PCM_16")
+    whole = path.read_bytes()
+    for _ in range(2000):
+        path.write_bytes(damaged(rng, whole))
+        try:
+            assert len(read_sound(path).audio)
+        except FacesynthError as error:
+            assert "\n" not in str(error)
+    assert "Traceback" not in capfd.readouterr().err
