@@ -126,8 +126,8 @@ def _slots_s(path: Path) -> Iterator[float]:
 
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
-        packets = [packet for packet in container.demux(stream) if packet.size and packet.dts is not None]
-        return iter(sorted(float(packet.dts * packet.time_base) for packet in packets))
+        unit_s = float(stream.time_base or 0)
+        return iter(sorted(packet.dts * unit_s for packet in container.demux(stream) if packet.size and packet.dts is not None))
 
 
 def _upright(frame: Any) -> Image:

@@ -52,7 +52,7 @@ def chunks_of(path: Path) -> Chunks | None:
             for packet in container.demux([sound, pictures])
             if packet.dts is not None and packet.pos is not None and packet.size
         ]
-        units = float(sound.time_base), float(pictures.time_base)
+        units = float(sound.time_base or 0), float(pictures.time_base or 0)
     heard, seen = (sorted(row for row in found if row[1] is is_sound) for is_sound in (True, False))
     if min(len(heard), len(seen)) < AROUND:
         return None
