@@ -3,8 +3,8 @@
 python benchmarks/passages.py CORPUS [--minutes 15] [--sentences 6]
 
 The recordings of CORPUS are strung together as in `long_files.py`. Of their text a paragraph is left out in the middle, or one of
-other words is put in there. Error is the distance from the middle of each p, b and m that the corpus has to the nearest one that was
-placed, outside of the paragraph and of two sentences beside it.
+other words is put in there. Error is the distance from the middle of each p, b and m that the corpus has to the nearest one that
+was placed, outside of the paragraph and of two sentences beside it.
 """
 
 import argparse
