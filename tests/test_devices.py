@@ -242,10 +242,10 @@ def test_train_says_in_one_line_that_a_device_is_not_there(tiny, tmp_path, monke
 
 
 def test_every_script_that_trains_takes_a_device(repository):
-    scripts = list((repository / "train").glob("*.py"))
+    written = {path: path.read_text(encoding="utf-8") for path in (repository / "train").glob("*.py")}
+    scripts = {path: said for path, said in written.items() if "facesynth.methods" in said or "torch" in said}
     assert len(scripts) > 8
-    for path in scripts:
-        said = path.read_text(encoding="utf-8")
+    for path, said in scripts.items():
         assert '"--device"' in said or "training_parser(" in said, path.name
         assert "options.device" in said, path.name
     parsed = training_parser("", Path("configs/ridge.yaml")).parse_intermixed_args(["corpus", "a=1", "--device", "cuda", "b=2"])
