@@ -81,7 +81,8 @@ class Expression:
     def signal(self, emotion: str, phones: PhoneTrack, count: int, *, seed: int = 0) -> Floats:
         """[count, D] a new signal of an emotion while phones are said, at the model's rate."""
         number = self._number(emotion)
-        expected = context_of(phones, count, self.fps) @ self.parts.weights[number] + self.parts.constants[number]
+        context = context_of(phones.told("expression"), count, self.fps)
+        expected = context @ self.parts.weights[number] + self.parts.constants[number]
         return expected + self.parts.variety * self.grow(emotion, count, seed=seed).frames
 
     def express(self, motion: Motion, speech: Speech, *, seed: int = 0) -> Motion:

@@ -73,6 +73,8 @@ class Network:
         what moves beside the lips. Nothing is random.
         """
         reject_options("network", options, ("seed",))
+        if self.needs_phones and not self.unsaid:
+            speech.phones.told("network")
         sound = resample(speech.audio, speech.sample_rate, RATE)
         count = max(1, int(speech.phones.frame_bounds(self.fps)[-1]))
         frames = self.expectation.poses(self.hear(sound), Said.of(speech, self.emotions), self.fps, count)

@@ -45,6 +45,15 @@ class PhoneTrack:
         """Whether anybody says what is spoken, be it that nobody speaks."""
         return self.confidences is None or bool(self.confidences.any()) or any(label != SILENCE for label in self.labels)
 
+    def told(self, method: str) -> Self:
+        """Itself; FacesynthError where nobody knows what is said, and the method must be told."""
+        if not self.known:
+            raise FacesynthError(
+                f"{method} must be told what is said, and nobody knows the phones of this speech; give its words or phones,"
+                " or take a model that hears the sound alone (ridge, lds, network phones=false)"
+            )
+        return self
+
     @property
     def starts_s(self) -> NDArray[np.float64]:
         """[P] start of each phone, seconds."""

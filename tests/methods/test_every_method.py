@@ -1,5 +1,7 @@
 """What everybody may expect of any method, whatever it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from every_method import METHODS
@@ -49,6 +51,17 @@ def test_a_saved_method_says_the_same(method, tiny, tmp_path):
     speech = tiny[tiny.ids[1]].speech
     method.save(tmp_path / "model.safetensors")
     assert_same(load(tmp_path / "model.safetensors").synthesize(speech), method.synthesize(speech))
+
+
+def test_one_that_must_be_told_what_is_said_refuses_speech_of_which_nobody_knows_it(method, tiny):
+    given = tiny[tiny.ids[0]].speech
+    felt = EmotionTrack.constant("happy", given.duration_s)
+    speech = replace(given, phones=PhoneTrack.unknown(given.duration_s), emotions=felt)
+    if method.needs_phones:
+        with pytest.raises(FacesynthError, match="must be told what is said"):
+            method.synthesize(speech)
+    else:
+        assert len(method.synthesize(speech)) == round(speech.duration_s * tiny.fps)
 
 
 def test_an_option_that_it_has_not_is_refused_by_name(method, tiny):

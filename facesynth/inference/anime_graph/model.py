@@ -113,8 +113,9 @@ class AnimeGraph:
 
     def wishes(self, speech: Speech) -> list[Wish]:
         """What each phone of the speech asks for."""
-        feelings, _ = speech.emotions.per_phone(speech.phones)
-        each = [self.numbers(label, feeling) for label, feeling in zip(speech.phones.labels, feelings, strict=True)]
+        phones = speech.phones.told("anime_graph")
+        feelings, _ = speech.emotions.per_phone(phones)
+        each = [self.numbers(label, feeling) for label, feeling in zip(phones.labels, feelings, strict=True)]
         said, felt = np.array(each).T
         require_sound(speech.audio, "the speech")
         features = self.hear(speech)

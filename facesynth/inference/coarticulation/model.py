@@ -62,7 +62,7 @@ class Coarticulation:
         phones are reached (`hold_keys`).
         """
         reject_options("coarticulation", options, ("seed",))
-        phones = speech.phones
+        phones = speech.phones.told("coarticulation")
         numbers = np.array([PHONE_INDEX[label] for label in phones.labels])
         classes = CLASS_OF[numbers]
         keys = self.parts.keys.of(numbers, classes, phones.ends_s - phones.starts_s)

@@ -185,7 +185,7 @@ class Efase:
         self, speech: Speech, emotion: str | None = None, constraints: Mapping[int, str] | None = None
     ) -> tuple[Query, Heard | None]:
         """What the search is asked for, what is heard included, and what that is."""
-        labels = speech.phones.labels
+        labels = speech.phones.told("efase").labels
         feelings = [emotion] * len(labels) if emotion else speech.emotions.per_phone(speech.phones)[0]
         query = self.query(labels, feelings, {t: self._node_index(t, name, labels) for t, name in (constraints or {}).items()})
         if self.hearing is None:

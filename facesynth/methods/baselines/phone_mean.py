@@ -58,7 +58,7 @@ class PhoneMean(Method):
         self.refuse(options)
         layout = self.fitted_layout
         targets = self._targets(speech)
-        knots_s, owners = _knots(speech.phones)
+        knots_s, owners = _knots(speech.phones.told(self.name))
         times_s = np.arange(speech.phones.frame_bounds(self.fps)[-1]) / self.fps
         if len(knots_s) == 1:
             return Motion(np.tile(targets[0].astype(np.float32), (len(times_s), 1)), self.fps, layout)

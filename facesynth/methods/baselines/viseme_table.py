@@ -55,7 +55,7 @@ class VisemeTable(Method):
         """Shapes of the phones' classes, cross-faded."""
         self.refuse(options)
         layout, count = self.fitted_layout, int(speech.phones.frame_bounds(self.fps)[-1])
-        shown = cross_fades(speech.phones, np.arange(count) / self.fps)
+        shown = cross_fades(speech.phones.told(self.name), np.arange(count) / self.fps)
         classes = np.array([viseme_of(label) for label in speech.phones.labels])
         frames = shown @ self.shapes.cpu().numpy().astype(np.float64)[classes]
         return Motion(frames.astype(np.float32), self.fps, layout)
