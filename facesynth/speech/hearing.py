@@ -11,7 +11,7 @@ from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import NEUTRAL, EmotionTrack, Speech
 from facesynth.speech.audio import read_sound, require_sound
 from facesynth.speech.emotions import read_emotions
-from facesynth.speech.phone_sources import Source, find_phones
+from facesynth.speech.phone_sources import Sought, Source, find_phones
 from facesynth.speech.segments import Segment
 
 
@@ -38,12 +38,11 @@ def hear(
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
-    phones_needed: bool = True,
+    sought: Sought = "placed",
 ) -> Heard:
     """Read a sound or video file with its phones and emotions; the tracks are exactly as long as the sound.
 
-    Phones are found as `find_phones` does it, `phones_path` being those that are given; `phones_needed=False` leaves them unknown
-    where nobody gave phones or words, for models that need none (`needs_phones`). Emotions come from the track
+    Phones are found as `find_phones` does it, `phones_path` being those that are given. Emotions come from the track
     `emotions_path`, else are one label for the whole (neutral if none is given) at an intensity from 0 to 1.
     FacesynthError says what cannot be used.
     """
@@ -59,7 +58,7 @@ def hear(
         emotion=emotion,
         emotions_path=emotions_path,
         intensity=intensity,
-        phones_needed=phones_needed,
+        sought=sought,
     )
     return replace(heard, warnings=(*sound.remarks, *heard.warnings))
 
@@ -76,7 +75,7 @@ def hear_sound(
     emotion: str | None = None,
     emotions_path: str | Path | None = None,
     intensity: float = 1.0,
-    phones_needed: bool = True,
+    sought: Sought = "placed",
 ) -> Heard:
     """The same for a sound [S], -1..1, at `rate` Hz."""
     if phones_path is None:
@@ -90,7 +89,7 @@ def hear_sound(
         text=text,
         language=language,
         transcriber=transcriber,
-        needed=phones_needed,
+        sought=sought,
     )
     if set(found.phones.labels) != {SILENCE}:  # who says that nobody speaks may give a sound without any
         require_sound(audio, rate)

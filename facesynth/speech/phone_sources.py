@@ -20,11 +20,12 @@ from facesynth.speech.textgrid import SAME_LENGTH_S, is_textgrid, read_labelled
 from facesynth.speech.transcript import words_of
 from facesynth.speech.transcription import Transcript, transcribe
 
-Source = Literal["textgrid", "labels", "transcript", "transcription", "recognition", "none"]
+Source = Literal["textgrid", "labels", "transcript", "transcription", "recognition", "listening", "none"]
+Sought = Literal["placed", "heard", "none"]
 PLACED: tuple[Source, ...] = ("transcript", "transcription", "recognition")
 """By a program: nobody gave the phones."""
 UNSOUGHT: Source = "none"
-"""Nobody gave phones, and nobody needs them: none were looked for."""
+"""Nobody gave phones, and none were looked for."""
 QUOTED = 60
 """Letters of a transcript that are told."""
 
@@ -53,20 +54,21 @@ def find_phones(
     text: str | None = None,
     language: str | None = None,
     transcriber: Path | None = None,
-    needed: bool = True,
+    sought: Sought = "placed",
 ) -> FoundPhones:
     """Phones of a sound [S], -1..1, at `rate` Hz: those that are given, else aligned with the words, else heard.
 
     given: a TextGrid, of which the phones of `speaker` are taken where it holds several, or lines of `end label`; text: what
     is said; language: of the text (ISO 639-1), found out where nobody says. What is heard without a text may be in any language.
-    transcriber: a folder with a model that writes down what is said, where no text is given. needed: whether phones are looked
-    for where neither they nor words are given; otherwise they stay unknown. FacesynthError where none of it
-    can be used.
+    transcriber: a folder with a model that writes down what is said, where no text is given. sought: what is done where neither
+    phones nor words are given. "placed" as exactly as can be; "heard" by the network alone, for models that need to be told
+    nothing, which rest where nobody speaks and shut lips at p, b and m; "none" leaves them unknown. FacesynthError where none
+    of it can be used.
     """
     if given is not None:
         return _read(given, len(audio) / rate, speaker)
-    if text is None and transcriber is None and not needed:
-        return FoundPhones(PhoneTrack.unknown(len(audio) / rate), (), (), UNSOUGHT)
+    if text is None and transcriber is None and sought != "placed":
+        return _listened(audio, rate) if sought == "heard" and is_installed() else _unknown(audio, rate)
     if text is None:
         return _heard(audio, rate) if transcriber is None else _transcribed(audio, rate, transcriber, language)
     spoken = code_of(language) if language is not None else language_of(text)
@@ -146,6 +148,18 @@ def _cross_check(audio: NDArray[np.float32], rate: int, words: Sequence[Segment]
     pronunciations = [(word, pronounce(word)) for word, _, _ in words]
     spikes = told(heard_classes(audio, rate), [phones for _, phones in pronunciations])
     return () if spikes is None else doubts([words[number] for number in doubtful(spikes, pronunciations)])
+
+
+def _unknown(audio: NDArray[np.float32], rate: int) -> FoundPhones:
+    return FoundPhones(PhoneTrack.unknown(len(audio) / rate), (), (), UNSOUGHT)
+
+
+def _listened(audio: NDArray[np.float32], rate: int) -> FoundPhones:
+    """Around the network's spikes, and a remark on what is no speech alone."""
+    from facesynth.speech.recognition import placed, speech_in
+
+    heard, doubts = speech_in(audio, rate)
+    return FoundPhones(placed(audio, rate, heard, fit=False), (), doubts, "listening")
 
 
 def _heard(audio: NDArray[np.float32], rate: int) -> FoundPhones:

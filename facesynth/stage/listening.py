@@ -78,15 +78,14 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
         for remark in encoding_remark(words) if text is not None else ():
             tell(f"warning: {remark}")
     if cast.detector is not None:
-        heard = hear(recording, text=text, phones_path=phones, phones_needed=cast.needs_phones, **_as_asked(request))
+        heard = hear(recording, text=text, phones_path=phones, **_as_asked(cast, request))
         return replace(heard, speech=_with_emotions(heard.speech, cast.detector, cast, request, tell))
     emotion = request.emotion or (None if request.emotions else cast.emotions[0])
     heard = hear(
         recording,
         text=text,
         phones_path=phones,
-        phones_needed=cast.needs_phones,
-        **_as_asked(request),
+        **_as_asked(cast, request),
         emotion=emotion,
         emotions_path=request.emotions,
         intensity=1.0 if isinstance(request.intensity, Path) else request.intensity,
@@ -94,9 +93,10 @@ def _heard(recording: Path, cast: Cast, request: Request, tell: Tell) -> Heard:
     return replace(heard, speech=_with_intensity(heard.speech, request))
 
 
-def _as_asked(request: Request) -> dict[str, Any]:
+def _as_asked(cast: Cast, request: Request) -> dict[str, Any]:
     """Of the phones."""
-    return {"speaker": request.speaker, "language": request.language, "transcriber": request.transcriber}
+    sought = "placed" if cast.needs_phones else "heard"
+    return {"speaker": request.speaker, "language": request.language, "transcriber": request.transcriber, "sought": sought}
 
 
 def _with_emotions(speech: Speech, detector: EmotionDetector, cast: Cast, request: Request, tell: Tell) -> Speech:

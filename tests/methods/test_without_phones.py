@@ -74,12 +74,16 @@ def test_the_check_says_it_once_and_finds_nothing_grave(corpus):
 
 
 @pytest.mark.parametrize("asked", HEARING_ALONE, ids=lambda asked: asked[0])
-def test_it_is_trained_and_speaks(corpus, asked, tmp_path):
+def test_it_is_trained_and_speaks(corpus, asked, tmp_path, monkeypatch):
+    """What is heard is used where nobody speaks and at p, b and m; nobody is asked for words, and no file is written of it."""
+    heard = phone_sources.FoundPhones(PhoneTrack(("p", "aa"), np.array([0.2, 0.5])), (), ("music is heard",), "listening")
+    monkeypatch.setattr(phone_sources, "_listened", lambda *_: heard)
     model, sound = tmp_path / "m.safetensors", tmp_path / "line.wav"
     run(train, asked[0], corpus.path, *asked[1:], "-o", model)
     speech = corpus[corpus.ids[1]].speech
     save_wav(sound, speech.audio, speech.sample_rate)
     told = run(speak, model, sound, "-o", tmp_path / "line.npz")
+    assert "music is heard" in told.stderr
     assert "phones" not in told.stderr
     assert not (tmp_path / "line.TextGrid").exists()
     with np.load(tmp_path / "line.npz") as made:

@@ -14,8 +14,9 @@ from facesynth.inference.speech_or_music import is_speech
 from facesynth.inference.spikes import Spike
 from facesynth.speech.audio import load_audio, save_wav
 from facesynth.speech.phone_graph import phone_hearing
+from facesynth.speech.phone_sources import find_phones
 from facesynth.speech.recognition import speech_in, speech_or_music
-from facesynth.stage.silent_pauses import SilentPauses
+from facesynth.stage.silent_pauses import SilentPauses, long_pauses
 
 REST_S = 0.3
 """After speech lips are at rest within it."""
@@ -143,6 +144,18 @@ def test_a_model_that_listens_rests_too(tmp_path, sentences):
     begin_s, end_s = len(first) / rate, len(first) / rate + BETWEEN_S
     rest = curves["jawOpen"][round((begin_s + REST_S) * FPS) : round((end_s - BREATH_S) * FPS)]
     assert rest.max() < 0.25 * curves["jawOpen"][: round(begin_s * FPS)].max()
+
+
+def test_a_model_that_is_told_nothing_is_told_where_nobody_speaks(sentences):
+    first, second, rate = sentences
+    sound = np.concatenate([first, melody("organ", BETWEEN_S, rate), second]).astype(np.float32)
+    found = find_phones(sound, rate, sought="heard")
+    ((start_s, stop_s),) = [span for span in long_pauses(found.phones) if span[1] - span[0] > 1]
+    assert start_s < len(first) / rate + REST_S
+    assert stop_s > len(first) / rate + BETWEEN_S - BREATH_S
+    assert [remark for remark in found.remarks if "The lips rest there" in remark] == list(found.remarks)
+    with pytest.raises(FacesynthError, match="no speech is heard"):
+        find_phones(melody("organ", BETWEEN_S, rate).astype(np.float32), rate, sought="heard")
 
 
 @pytest.mark.parametrize("pitch_hz", [0, 130, 220], ids=["whispered", "low", "high"])

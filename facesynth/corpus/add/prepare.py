@@ -230,7 +230,7 @@ def _heard(take: _Take, record: Record, recording: Recording) -> Heard:
         transcriber=recording.transcriber,
         phones_path=recording.phones,
         speaker=recording.speaker,
-        phones_needed=recording.placed,
+        sought="placed" if recording.placed else "none",
     )
     guessed = encoding_remark(recording.text) if recording.text is not None and record.text else ()
     return replace(heard, warnings=(*guessed, *heard.warnings))
