@@ -65,10 +65,10 @@ def main() -> None:
     learned = LogisticRegression(C=STRENGTH, max_iter=300).fit((rows - mean) / deviation, spoken)
     weights = learned.coef_[0] / deviation
     bias = float(learned.intercept_[0] - mean @ weights)
-    told = SpeechOrMusic(weights.astype(np.float32), bias)
-    right = ((rows @ told.weights + told.bias > 0) == spoken).mean()
+    rule = SpeechOrMusic(weights.astype(np.float32), bias)
+    right = ((rows @ rule.weights + rule.bias > 0) == spoken).mean()
     print(f"{len(rows):,} frames, {spoken.mean():.0%} of them speech; told right {right:.1%}")
-    np.savez(options.output, weights=told.weights, bias=np.float32(bias))
+    np.savez(options.output, weights=rule.weights, bias=np.float32(bias))
 
 
 def scene(rng: Rng, folders: Sequence[Sequence[Path]], band: Band) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
@@ -92,8 +92,8 @@ def _parts(rng: Rng, folders: Sequence[Sequence[Path]], band: Band) -> Iterator[
 
 def piece(rng: Rng, folders: Sequence[Sequence[Path]]) -> Floats:
     """[S] speech of any of the folders, at most PIECE_S of it."""
-    files = folders[rng.integers(len(folders))]
-    audio, rate = load_audio(files[rng.integers(len(files))])
+    files = folders[int(rng.integers(len(folders)))]
+    audio, rate = load_audio(files[int(rng.integers(len(files)))])
     sound = resample(audio, rate, RATE)
     first = int(rng.integers(max(1, len(sound) - round(PIECE_S * RATE))))
     return sound[first : first + round(PIECE_S * RATE)].astype(np.float64)
