@@ -14,7 +14,7 @@ DIGITS = 16
 """Of a sha256, in hexadecimal: two things that a person might give never share them."""
 FOLDER, GRID = "folder", "textgrid"
 """Not given, but kept as well: name of the folder that the recording came from, and the TextGrid as it was written."""
-NAMES = {"text": "words"}
+NAMES = {"text": "words", "transcriber": "words"}
 """What a part is called when a person is told of it."""
 
 
@@ -37,6 +37,8 @@ class Given:
             prints["phones"] = _short(f"{prints['phones']} {recording.speaker}")
         facts = {name: cell(value) for name, value in self.facts.items()}
         facts |= {"face": str(self.face)} if self.face is not None else {}
+        if recording.transcriber is not None and recording.phones is None and "text" not in facts:
+            facts["transcriber"] = str(recording.transcriber.resolve())
         facts[FOLDER] = recording.motion.resolve().parent.name
         return prints | {name: _short(value) for name, value in facts.items()}
 
@@ -47,11 +49,14 @@ class Given:
 
 
 def changes(given: Given, prints: Mapping[str, str], old: Record) -> frozenset[str]:
-    """Parts that are given otherwise than before; what was never given before is compared with what the corpus says."""
+    """Parts that are given otherwise than before; what was never given before is compared with what the corpus says.
+
+    Who writes down the words counts where there are none.
+    """
     before = read_prints(old.given)
     new = {part for part in prints if part != FOLDER and before.get(part) != prints[part]}
     same = {part for part in new - set(before) if part in given.facts and getattr(old, part) == given.facts[part]}
-    return frozenset(new - same)
+    return frozenset(new - same - ({"transcriber"} if old.text else set()))
 
 
 def read_prints(given: str) -> dict[str, str]:

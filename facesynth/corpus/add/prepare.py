@@ -34,6 +34,8 @@ from facesynth.speech.textgrid import read_textgrid, write_textgrid
 if TYPE_CHECKING:
     from facesynth.speech.hearing import Heard
 
+SPOKEN = frozenset({"text", "phones", "transcriber"})
+"""What of the given decides the phones."""
 BETWEEN = "|"
 """Between the remarks on the motion and those on the speech."""
 FAULT = "a fault of facesynth"
@@ -145,7 +147,7 @@ def _again(corpus: Corpus, old: Record, given: Given, changed: frozenset[str], r
     record = replace(old, **{name: given.facts[name] for name in changed if name in given.facts})
     _require_emotion(corpus, record, recording)
     captures = bool({"sound", "motion", "face"} & changed or {"sound", "motion"} & lost)
-    respoken = "text" in changed and bool(old.aligned_hash) and recording.phones is None
+    respoken = bool({"text", "transcriber"} & changed) and bool(old.aligned_hash) and recording.phones is None
     take = _captured(corpus, recording, given.face) if captures else _stored(corpus, old)
     heard = None
     if respoken or "sound" in changed or "phones" in changed | lost:
@@ -154,7 +156,7 @@ def _again(corpus: Corpus, old: Record, given: Given, changed: frozenset[str], r
     if heard is not None and not replacing and _is_by_hand(corpus, old, heard):
         if "sound" in changed:
             return _staying(corpus, old, "the phones were corrected by hand, so all of it stays; --replace takes the new sound")
-        heard, changed, kept = None, changed - {"text", "phones"}, "the phones were corrected by hand; --replace places them anew"
+        heard, changed, kept = None, changed - SPOKEN, "the phones were corrected by hand; --replace places them anew"
     phones = heard.speech.phones if heard else read_textgrid(corpus.files.phones(old.id))[0]
     emotions = _emotions(corpus, record, recording, take.duration_s)
     emotion_changed = {"emotion", "intensity", "emotions", "sound"} & changed
@@ -175,7 +177,7 @@ def _again(corpus: Corpus, old: Record, given: Given, changed: frozenset[str], r
 
 def _accounted(record: Record, given: Given, kept: str, take: _Take | None, heard: Heard | None) -> Record:
     """The record with the account of what was given and noticed; what was not taken counts as not given."""
-    prints = {part: value for part, value in given.prints().items() if not (kept and part in ("text", "phones"))}
+    prints = {part: value for part, value in given.prints().items() if not (kept and part in SPOKEN)}
     if heard is not None:
         prints[GRID] = _grid_hash(heard)[:DIGITS]
         record = replace(record, text=heard.speech.text or record.text)
