@@ -1,7 +1,7 @@
 // Sound in, a talking head out, all in the page.
 import * as ort from "./ort/ort.wasm.min.mjs";
 import { Head } from "./head.js";
-import { openFolder, readWav, run, speak } from "./model.js";
+import { openFolder, openSystem, readWav, run, speak } from "./model.js";
 
 ort.env.wasm.wasmPaths = new URL("./ort/", import.meta.url).href;
 // Threads share memory, which a page may do only where its server isolates it from others (COOP and COEP headers).
@@ -17,7 +17,7 @@ const read = (folder) => async (name) => {
 
 async function main() {
   const began = performance.now();
-  const [lds, face] = await Promise.all([openFolder(read("model"), ort), openFolder(read("face"), ort)]);
+  const [lds, face] = await Promise.all([openSystem(read("model"), ort), openFolder(read("face"), ort)]);
   const wav = await read(".")("speech.wav");
   const audio = readWav(wav.buffer, lds.manifest.sample_rate);
   const ready = performance.now();
@@ -66,6 +66,6 @@ function report(result) {
 }
 
 main().catch((error) => {
-  said.textContent = String(error);
-  fetch("report", { method: "POST", body: JSON.stringify({ error: String(error) }) }).catch(() => {});
+  said.textContent = error.message;
+  fetch("report", { method: "POST", body: JSON.stringify({ error: error.message }) }).catch(() => {});
 });

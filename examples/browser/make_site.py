@@ -12,6 +12,7 @@ from facesynth.export.parts import mesh_deformation_graph
 from facesynth.face.rig.anny import PARTS
 from facesynth.face.rig.arkit_rig import Rig, load_head
 from facesynth.face.rig.markers import marker_layout
+from facesynth.inference.errors import FacesynthError
 from facesynth.speech.audio import load_audio, resample, save_wav
 
 RATE = 16000
@@ -23,7 +24,9 @@ IRIS_MM = 6.0
 def main(model: Path, speech: Path, site: Path) -> None:
     rig = load_head()
     layout = marker_layout(rig)
-    export_model(model, site / "model")
+    manifest = export_model(model, site / "model", only="lds")
+    if "features" not in manifest["graphs"]:
+        raise FacesynthError(f"{model} hears with the phone network, the page does not; train one with hears=periodogram")
     subject = Subject("graphs", {"licences": ["CC0-1.0"], "consents": ["nobody was recorded"]}, layout.to_dict(), None, ())
     write_folder(site / "face", subject, Content((mesh_deformation_graph(rig, layout),), {}, {"look_ahead_s": 0.0}))
     audio, rate = load_audio(speech)

@@ -20,6 +20,14 @@ export async function openFolder(read, ort) {
   return { manifest, graphs };
 }
 
+// The same of a linear dynamical system whose input is a graph of its own; other models of facesynth need more than this file does.
+export async function openSystem(read, ort) {
+  const system = await openFolder(read, ort), { method } = system.manifest;
+  if (method !== "lds") throw new Error(`the folder holds a model of method ${method}; wanted lds, trained with hears=periodogram`);
+  if (!system.graphs.features) throw new Error("this system hears with the phone network; wanted one that was trained with hears=periodogram");
+  return system;
+}
+
 // The manifest's own hash is that of its JSON without the hash, keys sorted, no spaces. JSON.parse would forget that 60.0
 // is not written 60, so the text itself is put in that order.
 async function checkManifest(text, { sha256: wanted }) {
@@ -89,7 +97,6 @@ export async function run(graph, inputs, ort) {
 // Sound at the model's rate to frames [T * C], by the deterministic part of the system.
 export async function speak(lds, audio, ort) {
   const { manifest, graphs } = lds;
-  if (!graphs.features) throw new Error("this system hears with a network; export one that was trained with hears=periodogram");
   const { window_samples: length, lead_ms, states, components } = manifest.settings;
   const count = Math.round((audio.length / manifest.sample_rate) * manifest.fps);
   const windows = new Float32Array(count * length);

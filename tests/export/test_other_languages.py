@@ -2,6 +2,7 @@
 
 import base64
 import json
+import runpy
 import shutil
 import struct
 import subprocess
@@ -9,14 +10,16 @@ import sys
 
 import numpy as np
 import pytest
-from pages import a_browser, colours, installed, visited
+from pages import EXAMPLES, a_browser, colours, installed, visited
 
 from facesynth.corpus import Corpus, Record
 from facesynth.inference import load
+from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.methods.lds.method import LDS
 from facesynth.speech.audio import save_wav
+from facesynth.speech.phone_archive import is_installed
 
 RATE, FPS = 16000, 30
 
@@ -82,6 +85,16 @@ def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
     assert np.abs(frames - expected(tmp_path / "lds", sound)).max() < 1e-2  # mm
 
 
+@pytest.fixture(scope="module")
+def default_lds_file(small_corpus, tmp_path_factory):
+    """A system that hears as systems do by default."""
+    if not is_installed():
+        pytest.skip("the weights that phones are heard with are not installed")
+    path = tmp_path_factory.mktemp("models") / "default.safetensors"
+    LDS(deterministic_order=2, stochastic_order=2).fit(small_corpus).save(path)
+    return path
+
+
 def wav(channels=1, bits=16, kind=1, samples=4000, rate=RATE, cut=0):
     """A file of noise, written by hand."""
     width = channels * bits // 8
@@ -128,6 +141,32 @@ def test_node_refuses_what_the_runtime_refuses(lds_file, exported, tmp_path):
     for name, (_, _, message) in WRONG.items():
         assert said[name][0] != 0, name
         assert message in said[name][1], (name, said[name][1])
+        assert said[name][1].strip().count("\n") == 0, said[name][1]
+
+
+def test_node_refuses_in_one_line_what_it_cannot_hear_with(default_lds_file, coarticulation_file, exported, tmp_path):
+    here, node = installed("node"), shutil.which("node")
+    (tmp_path / "a.wav").write_bytes(wav())
+    for script, model, message in (
+        (
+            "speak.mjs",
+            default_lds_file,
+            "this system hears with the phone network; wanted one that was trained with hears",
+        ),
+        ("speak.mjs", coarticulation_file, "a model of method coarticulation; wanted lds"),
+        ("hear.mjs", coarticulation_file, "a model of method coarticulation; wanted what `facesynth export phones` writes"),
+    ):
+        command = [node, script, str(exported(model)), str(tmp_path / "a.wav")]
+        done = subprocess.run(command, cwd=here, check=False, capture_output=True, text=True, timeout=1800)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert message in done.stderr
+        assert done.stderr.strip().count("\n") == 0, done.stderr
+
+
+def test_the_page_is_not_made_of_a_system_that_it_cannot_hear_with(default_lds_file, rig, tmp_path):
+    make_site = runpy.run_path(str(EXAMPLES / "browser" / "make_site.py"))["main"]
+    with pytest.raises(FacesynthError, match="hears with the phone network, the page does not; train one with hears=period"):
+        make_site(default_lds_file, tmp_path / "a.wav", tmp_path / "site")
 
 
 def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
