@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import Growing, all_finite, row_blocks
+
+SEEN = 2
+"""Frames before and after two neighbours that the monotone cubic between them depends on, with one to spare."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,7 @@ class FaceAnimation:
         if self.ranges is not None:
             object.__setattr__(self, "ranges", _checked(self.ranges, (len(self.names), 2), "ranges"))
         low, high = self.limits
-        if (self.weights < low).any() or (self.weights > high).any():
+        if any(((some < low) | (some > high)).any() for some in map(self.weights.__getitem__, row_blocks(self.weights))):
             wanted = "0..1" if self.ranges is None else "the ranges of their channels"
             raise FacesynthError(
                 f"weights must lie in {wanted}; got {self.weights.min():.3f}..{self.weights.max():.3f}; clip them before"
@@ -87,7 +91,6 @@ class FaceAnimation:
         Monotone cubic interpolation, which never leaves the range of its neighbours, so that weights
         stay in their ranges and a shut eye stays shut; the head turns on the shortest arc.
         """
-        from scipy.interpolate import PchipInterpolator
         from scipy.spatial.transform import Rotation, Slerp
 
         if not (np.isfinite(fps) and fps > 0):
@@ -98,12 +101,12 @@ class FaceAnimation:
         at = np.minimum(np.arange(count) / fps, self.times_s[-1])
         rotation = Slerp(self.times_s, Rotation.from_rotvec(self.head[:, :3]))(at).as_rotvec()
 
-        def curve(values: NDArray[Any]) -> NDArray[np.float64]:
-            return PchipInterpolator(self.times_s, values, axis=0)(at)
+        def curve(values: NDArray[Any], low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> NDArray[np.float32]:
+            return monotone_cubic(self.times_s, values, at, low, high)
 
         return replace(
             self,
-            weights=np.clip(curve(self.weights), *self.limits),
+            weights=curve(self.weights, *self.limits),
             head=np.concatenate([rotation, curve(self.head[:, 3:])], axis=1),
             gaze=curve(self.gaze),
             tongue_up=curve(self.tongue_up),
@@ -119,10 +122,29 @@ class FaceAnimation:
         return replace(self, fps=fps, residual_mm=residual, **tracks)
 
 
+# The cubic of an interval depends on the values at its ends and the slopes there, and a slope on its own value and on those
+# of its two neighbours (Fritsch & Butland 1984; at the ends of the whole, on the first and last three). A piece with that
+# much around it therefore gives the same numbers as the whole, whose four coefficients an interval need not be there at once.
+def monotone_cubic(
+    times_s: NDArray[Any], values: NDArray[Any], at_s: NDArray[Any], low: ArrayLike, high: ArrayLike
+) -> NDArray[np.float32]:
+    """[n, ...] values [T, ...] of ascending times [T] read at ascending times [n] within them, kept in low..high; T > 1."""
+    from scipy.interpolate import PchipInterpolator
+
+    parts = Growing()
+    for rows in row_blocks(values):
+        around = slice(max(0, rows.start - SEEN), rows.stop + 1 + SEEN)
+        first = np.searchsorted(at_s, times_s[rows.start])
+        stop = np.searchsorted(at_s, times_s[rows.stop]) if rows.stop < len(times_s) else len(at_s)
+        read = PchipInterpolator(times_s[around], values[around], axis=0)(at_s[first:stop]) if first < stop else values[:0]
+        parts.add(np.clip(read, low, high))
+    return parts.whole()
+
+
 def _checked(value: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float32]:
     array = np.asarray(value, np.float32)
     if array.shape != shape:
         raise FacesynthError(f"{name} of an animation must have shape {list(shape)}; got {list(array.shape)}")
-    if not np.isfinite(array).all():
+    if not all_finite(array):
         raise FacesynthError(f"{name} of an animation holds NaN or infinite values; fill the gaps first")
     return array

@@ -145,7 +145,7 @@ def animate(
     weights = gaze_weights(weights, gaze)
     weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
     tip = np.clip(tongue_track(TIP_UP, phones, len(motion), motion.fps), 0, 1)
-    return FaceAnimation(rig.names, np.clip(weights, 0, 1), head, gaze, tip, motion.fps, residual)
+    return FaceAnimation(rig.names, np.clip(weights, 0, 1, out=weights), head, gaze, tip, motion.fps, residual)
 
 
 def on_head(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> Motion:
@@ -169,9 +169,7 @@ def _check_whole(motion: Motion) -> None:
 def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if motion.layout.kind == "curves":
         return _curves(motion), None
-    known = np.zeros((len(motion), len(rig.names)))
-    if motion.eyes is not None:
-        known = gaze_weights(known, motion.eyes[:, 1:])
+    known = None if motion.eyes is None else gaze_weights(np.zeros((len(motion), len(rig.names))), motion.eyes[:, 1:])
     if is_of_the_head(motion.layout):
         return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
     fit = fit_layout(rig, motion.layout, rest_of(motion))

@@ -96,17 +96,19 @@ def solve_markers(
     known: [T, 52] weights of the shapes that are not solved for (gaze, tongue); zero where not given. Their
     share of the motion is taken off the markers first.
     """
-    weights = np.zeros((len(np.asarray(frames)), len(basis.shapes_mm))) if known is None else np.array(known, np.float64)
-    weights[:, basis.free] = 0.0
+    weights = np.zeros((len(np.asarray(frames)), len(basis.shapes_mm)))  # takes no memory until it is written
+    if known is not None:
+        weights[:, ~basis.free] = np.asarray(known, np.float64)[:, ~basis.free]
     pieces = [slice(first, first + BLOCK) for first in range(0, max(1, len(weights)), BLOCK)]
     lift = np.concatenate([np.eye(basis.shapes_mm.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
     shapes = basis.shapes_mm[basis.free] @ lift
     onto = np.linalg.qr(shapes.T)[0]  # what lies outside of the shapes' span changes no weight
-    wanted = []
+    wanted = np.empty((len(weights), onto.shape[1]))
     for piece in pieces:
-        wanted.append((basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto))
+        wanted[piece] = (basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto)
         let_go(np.asarray(frames))
-    weights[:, basis.free] = solve(shapes @ onto, np.concatenate(wanted), basis.ridge[basis.free], fps=fps)
+    weights[:, basis.free] = solve(shapes @ onto, wanted, basis.ridge[basis.free], fps=fps)
+    del wanted
     residual_mm = np.empty(len(weights))
     for piece in pieces:
         offsets = basis.offsets(frames, piece)

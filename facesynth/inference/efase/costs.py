@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..efase.nodes import Nodes
+from ..long_arrays import let_go
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class Query:
         fixed = {t - first: node for t, node in self.fixed.items() if first <= t <= places[-1]}
         strict = None if self.strict is None else self.strict[places]
         heard = None if self.heard is None else self.heard[places]
+        if self.heard is not None:
+            let_go(self.heard)
         return Query(self.phones[places], self.visemes[places], self.emotions[places], fixed, strict, heard)
 
 

@@ -18,6 +18,7 @@ from ..arrays import Floats, Ints
 from ..efase.nodes import Nodes
 from ..efase.steps import squared_distances
 from ..expectation import Bands, Expectation, Said, Single, Standard
+from ..long_arrays import let_go, zeros
 from ..phones import PHONES, SILENCE
 from ..products import product
 from ..speech import PhoneTrack, Speech
@@ -25,6 +26,8 @@ from ..speech import PhoneTrack, Speech
 SPAN = (-0.25, 1.25)
 """From where to where the sound of a phone is taken, in parts of its duration."""
 PLACES = 5
+TOGETHER_BYTES = 32 << 20
+"""Costs of so many phones at all nodes that are computed together: 138 phones of 30,000 nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class Heard:
     """Of one input."""
 
     costs: Floats
-    """[P, N] of every node at every phone."""
+    """[P, N] of every node at every phone; in a file where they are large, for a search looks at one stretch of them."""
     sounds: Floats | None
     """[P, A] sound of each phone; None where it does not count."""
     poses: Floats | None
@@ -128,11 +131,11 @@ class Hearing:
     def hear(self, speech: Speech, felt: Ints, count: int, fps: float) -> Heard:
         """felt [P] numbers of the emotions, count nodes, fps of the database."""
         labels, bounds, bands = speech.phones.labels, speech.phones.frame_bounds(fps), self.heard_bands(speech)
-        spoken = np.array([label != SILENCE for label in labels])
-        costs, sounds, poses = np.zeros((len(labels), count)), None, None
+        spoken = np.flatnonzero([label != SILENCE for label in labels])
+        costs, sounds, poses = zeros((len(labels), count)), None, None
         if self.sounds is not None:
             sounds = self.sounds.of(bands, speech.phones)
-            costs[spoken] += self.sound_weight * self.rows("sound", self.sounds.distances, sounds[spoken])
+            self._add(costs, spoken, self.sound_weight, "sound", self.sounds.distances, sounds[spoken])
         if self.expectation is not None and self.distances is not None:
             said = Said.numbered(
                 [PHONES.index(label) for label in labels],
@@ -141,11 +144,26 @@ class Hearing:
                 self.expectation.reading.emotion_count,
             )
             poses = self.expectation.poses(bands, said, fps, int(bounds[-1]))
-            asked = np.flatnonzero(spoken & (np.diff(bounds) > 0))
+            asked = spoken[np.diff(bounds)[spoken] > 0]
             pieces = [poses[bounds[t] : bounds[t + 1]] for t in asked]
-            if pieces:
-                costs[asked] += self.pose_weight * self.rows("pose", self.distances.of, pieces)
+            self._add(costs, asked, self.pose_weight, "pose", self.distances.of, pieces)
         return Heard(costs, sounds, poses)
+
+    def _add(
+        self,
+        costs: Floats,
+        asked: Ints,
+        weight: float,
+        what: str,
+        compute: Callable[[Sequence[Floats]], Floats],
+        pieces: Sequence[Floats],
+    ) -> None:
+        """To the costs [P, N] of the phones `asked` [n], what is computed of their n pieces, some phones at a time."""
+        together = max(1, TOGETHER_BYTES // max(1, costs[:1].nbytes))
+        for first in range(0, len(asked), together):
+            some = slice(first, first + together)
+            costs[asked[some]] += weight * self.rows(what, compute, pieces[some])
+            let_go(costs)
 
     def heard_bands(self, speech: Speech) -> Single:
         """[F, 40] log-mel bands of the sound."""
