@@ -7,7 +7,8 @@ takes of FACEGOOD (MIT), one of BEAT2 (Apache-2.0), the built-in performer's voi
 Scenes are made of them and of music and noise that nobody recorded (`tunes.py`; the soundfont FluidR3 is under the MIT licence),
 one after the other at many levels. Speech is changed, too: sung to a tune or on one note, whispered, in noise, in a room, through
 a telephone, over music that is softer, of another size or colour. A logistic regression tells, from the mean of all layers over
-0.22 s, which of both sounds. Wanted beside facesynth: scikit-learn, pyworld, tinysoundfont.
+0.22 s, which of both sounds. Wanted beside facesynth: the extras `train` and `voice`, and tinysoundfont (MIT), which stands in
+none, for it asks for pyaudio, which is compiled and not needed here: `pip install --no-deps tinysoundfont`.
 """
 
 import argparse

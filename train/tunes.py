@@ -36,8 +36,10 @@ class Band:
     """Plays the instruments of a soundfont (with the package tinysoundfont)."""
 
     def __init__(self, path: Path) -> None:
-        import tinysoundfont
-
+        try:
+            import tinysoundfont
+        except ImportError as error:
+            raise SystemExit("tinysoundfont plays the soundfont: pip install --no-deps tinysoundfont") from error
         self.synth = tinysoundfont.Synth(samplerate=RATE, gain=-6)
         self.font = self.synth.sfload(str(path))
 

@@ -35,7 +35,7 @@ async function main() {
   const seconds = audio.length / lds.manifest.sample_rate;
   said.textContent = `${count} frames for ${seconds.toFixed(2)} s of speech in ${(spoken - ready).toFixed(0)} ms`
     + ` on ${threads} thread${threads === 1 ? "" : "s"}${globalThis.crossOriginIsolated ? "" : " (the page is not cross-origin isolated)"}`;
-  report({ count, channels, frames: Array.from(frames), start_ms: ready - began, speak_ms: spoken - ready, seconds });
+  report({ count, channels, frames: Array.from(frames), start_ms: ready - began, speak_ms: spoken - ready, seconds, said: said.textContent });
   playable(lds, show, count);
 }
 

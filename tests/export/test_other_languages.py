@@ -1,6 +1,7 @@
 """The same folder from JavaScript: in Node, and in a page of a real browser with the network cut off."""
 
 import base64
+import hashlib
 import json
 import runpy
 import shutil
@@ -199,3 +200,19 @@ def test_the_page_speaks_in_a_browser_without_a_network(talking_head, tmp_path):
     picture = base64.b64decode(report["picture"].partition(",")[2])
     (tmp_path / "page.png").write_bytes(picture)
     assert colours(tmp_path / "page.png") > 100  # a shaded head, no empty canvas
+    assert report["said"].endswith("on 1 thread (the page is not cross-origin isolated)")
+    graph = damaged(here / "site" / "model")
+    assert f"{graph} is no graph that onnxruntime runs" in visited(browser, here / "site", tmp_path)["error"]
+
+
+def damaged(folder):
+    """The name of a graph of an exported folder that is no graph any more, though its hash is what the manifest says."""
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    del manifest["sha256"]
+    name = next(iter(manifest["graphs"].values()))["file"]
+    (folder / name).write_bytes((folder / name).read_bytes()[:1000])
+    manifest["files"][name]["sha256"] = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+    plain = json.dumps(manifest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    manifest["sha256"] = hashlib.sha256(plain.encode()).hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(manifest, ensure_ascii=False), encoding="utf-8")
+    return name

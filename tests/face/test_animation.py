@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.behaviour.eyes import quiet_blinks, quiet_gaze
@@ -135,6 +136,16 @@ def test_resampling_keeps_time_range_and_turns(fps):
     inside = other.times_s <= animation.times_s[-1]
     np.testing.assert_allclose(other.head[inside, 1], 0.3 * np.sin(other.times_s[inside] * 2), atol=0.01)
     assert animation.resampled(120.0) is animation
+
+
+@pytest.mark.parametrize("count", [2, 3, 1023, 1024, 1025, 1026, 2600])
+@pytest.mark.parametrize("fps", [1.0, 29.97, 240.0])
+def test_a_long_animation_read_in_pieces_is_what_the_whole_gives_bit_for_bit(count, fps):
+    animation = some_animation(count)
+    other = animation.resampled(fps)
+    at = np.minimum(other.times_s, animation.times_s[-1])
+    whole = np.clip(PchipInterpolator(animation.times_s, animation.weights, axis=0)(at), 0, 1)
+    np.testing.assert_array_equal(other.weights, whole.astype(np.float32))
 
 
 def test_one_frame_and_no_frame():

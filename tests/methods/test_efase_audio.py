@@ -1,5 +1,6 @@
 """eFASE that hears: audio terms, the expected pose, sharpening, and learning through the soft search."""
 
+import mmap
 import shutil
 from dataclasses import replace
 
@@ -13,6 +14,8 @@ from facesynth.config import load_config
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import marker_error
+from facesynth.inference import long_arrays
+from facesynth.inference.efase import hearing as listening
 from facesynth.inference.efase.assembly import Smoothing, concatenate
 from facesynth.inference.efase.hearing import PoseDistances
 from facesynth.inference.errors import FacesynthError
@@ -55,6 +58,16 @@ def test_a_recorded_sentence_sounds_like_itself(hearing, halves):
     np.testing.assert_allclose(distances[np.arange(len(spoken)), places], 0, atol=1e-4)
     pairs = sounds.distances(nodes)
     assert pairs[~np.eye(len(nodes), dtype=bool)].mean() == pytest.approx(2, rel=0.05)
+
+
+def test_costs_in_a_file_and_some_phones_at_a_time_are_the_same(hearing, speech, monkeypatch):
+    whole, plan = hearing.asked(speech)[1], hearing.plan(speech)
+    for module, name, least in ((long_arrays, "LARGE_BYTES", 1), (listening, "TOGETHER_BYTES", 3 * whole.costs[:1].nbytes)):
+        monkeypatch.setattr(module, name, least)
+    pieces = hearing.asked(speech)[1]
+    assert isinstance(pieces.costs.base.base.obj, mmap.mmap)
+    np.testing.assert_allclose(pieces.costs, whole.costs, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(hearing.plan(speech).nodes, plan.nodes)
 
 
 def test_the_audio_term_draws_the_path_to_nodes_that_sound_alike(hearing, speech):
