@@ -135,7 +135,7 @@ class Hearing:
         costs, sounds, poses = zeros((len(labels), count)), None, None
         if self.sounds is not None:
             sounds = self.sounds.of(bands, speech.phones)
-            self._add(costs, spoken, self.sound_weight, "sound", self.sounds.distances, sounds[spoken])
+            self._add(costs, spoken, self.sound_weight, "sound", self.sounds.distances, list(sounds[spoken]))
         if self.expectation is not None and self.distances is not None:
             said = Said.numbered(
                 [PHONES.index(label) for label in labels],
