@@ -51,6 +51,7 @@ SEARCHES: dict[str, tuple[Callable[[Network, Corpus], Any], Callable[[Any], tupl
     "anime graph soft": (soft_graph, lambda model: (model, model.in_metric)),
 }
 """How each is made, and where it keeps the network and in which coordinates it asks it."""
+CHANGED = "network, both, 8 voices"
 PLAIN = ("viseme_table", "coarticulation", "efase", "anime_graph")
 HEADS = (
     "own lip error",
@@ -81,7 +82,11 @@ class Learner:
     def network(self, features: str) -> Network:
         """The network of poses that hears so, from the folder or newly learned."""
         variant = Variant({"features": features, "voices": VOICES.get(features, 0)})
-        return kept(self.kept / f"network, {features}.safetensors", self.learned, variant, 0, self.device)
+        return self.variant(f"network, {features}", variant)
+
+    def variant(self, name: str, variant: Variant) -> Network:
+        """The network that is trained so, from the folder or newly learned."""
+        return kept(self.kept / f"{name}.safetensors", self.learned, variant, 0, self.device)
 
     def soft(self, name: str, features: str) -> Method:
         """A search that expects what that network does; its nodes are the same whatever is heard, and learned once."""
@@ -116,6 +121,8 @@ def rows(learner: Learner) -> dict[str, Callable[[], Method]]:
         made[f"network, {features}"] = lambda features=features: learner.network(features)
         for name in SEARCHES:
             made[f"{name}, {features}"] = lambda name=name, features=features: learner.soft(name, features)
+    changed = Variant({"features": "both", "voices": VOICES["phone_net"]})
+    made[CHANGED] = lambda: learner.variant(CHANGED, changed)
     return made
 
 
