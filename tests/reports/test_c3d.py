@@ -85,6 +85,36 @@ def test_outputs_of_a_model_are_no_markers(tmp_path, kind, subject):
 
 
 @pytest.mark.parametrize(
+    ("markers", "outputs", "lists"),
+    [
+        ("", ["Ada:HeadAngles", "Ada:Power"], {"ANGLES": ["Ada:HeadAngles"], "POWERS": ["Ada:Power"]}),
+        ("", ["Ada:HeadAngles", "Bo:Power"], {"ANGLES": ["Ada:HeadAngles"], "POWERS": ["Bo:Power"]}),
+        ("Ada:", ["Ada:HeadAngles", "Ada:Power"], {"ANGLES": ["HeadAngles"], "POWERS": ["Power"]}),
+        ("", ["HeadAngles", "Power"], {"ANGLES": ["Ada:HeadAngles"], "POWERS": ["Ada:Power"]}),
+        ("Ada:", ["HeadAngles", "Bo:Power"], {"ANGLES": ["Ada:HeadAngles"], "POWERS": ["Bo:Power"]}),
+        ("", ["HeadAngles", "Power"], {"ANGLES": ["HeadAngles"], "ANGLES2": ["Power"]}),
+        ("Ada:", ["Ada:chest", "chin"], {"FORCES": ["chin"], "FORCES2": ["Ada:chest"]}),
+    ],
+)
+def test_outputs_are_known_whichever_states_the_subject(tmp_path, markers, outputs, lists):
+    points = np.concatenate([np.full((300, 2, 3), 90.0), face()], axis=1)
+    labels = [*outputs, *(markers + name for name in NAMES)]
+    reading = read(with_extra(tmp_path / "a.c3d", points, labels, lists))
+    assert reading.motion.layout.names == tuple(NAMES)
+    np.testing.assert_allclose(reading.motion.points, face(), atol=1e-3)
+    assert "2 outputs of a model" in reading.remarks[0]
+
+
+@pytest.mark.parametrize("label", ["Bo:chest", "chest"])
+def test_a_marker_called_like_the_output_of_another_subject_is_kept(tmp_path, label):
+    points = np.concatenate([face(), np.full((300, 1, 3), 90.0), face()[:, :1]], axis=1)
+    labels = [*(f"Ada:{name}" for name in NAMES), "Ada:chest", label]
+    reading = read(with_extra(tmp_path / "a.c3d", points, labels, {"FORCES": ["Ada:chest"]}))
+    assert reading.motion.layout.names[-1] == label
+    assert len(reading.motion.layout.names) == 7
+
+
+@pytest.mark.parametrize(
     ("unit", "mm"),
     [
         ("meters", 1000),

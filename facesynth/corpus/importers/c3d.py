@@ -38,7 +38,8 @@ def read_c3d(path: Path, layout: Layout | None = None, written: Written | None =
     """
     require_file(path)
     content = _opened(path)
-    labels, outputs = _without_subject(content.labels), frozenset(_without_subject(sorted(content.outputs)))
+    are_outputs = _of_model(content.labels, content.outputs)
+    labels = _without_subject(content.labels, are_outputs)
     written = written or Written()
     unit = content.unit or "mm"
     if not written.unit and unit_mm(unit) is None:
@@ -46,26 +47,26 @@ def read_c3d(path: Path, layout: Layout | None = None, written: Written | None =
             f"{path} is in {content.unit!r}; known units are {', '.join(UNITS_MM)}; say the right one in a layout file:"
             " `files: {unit: …}`"
         )
-    are_markers = np.array([label not in outputs for label in labels], bool)
-    content.points[:, are_markers], gaps = open_gaps(content.points[:, are_markers])
+    content.points[:, ~are_outputs], gaps = open_gaps(content.points[:, ~are_outputs])
     placed = written.placed(content.points, unit)
-    names = _named(path, labels, outputs) if layout is None else layout.names
+    names = _named(path, labels, are_outputs) if layout is None else layout.names
     for name in names:
         if name not in labels:
             raise FacesynthError(f"{path}: {unknown('marker', name, labels)}")
-    places = [labels.index(name) for name in names]
+    place_of = {labels[k]: k for k in sorted(range(len(labels)), key=lambda k: (are_outputs[k], k), reverse=True)}
+    places = [place_of[name] for name in names]
     frames = placed[:, places]
-    remarks = [*content.remarks, *_left_out(labels, names, outputs)]
+    remarks = [*content.remarks, *_left_out(labels, places, are_outputs)]
     remarks += gaps
     remarks += _size(frames, written.unit or unit)
     motion = motion_of_arrays(path, frames.reshape(len(placed), -1), content.fps, layout or Layout("markers", names))
     return Reading(motion, _sound(content), remarks=tuple(remarks))
 
 
-def _left_out(labels: list[str], names: tuple[str, ...], outputs: frozenset[str]) -> list[str]:
+def _left_out(labels: list[str], places: list[int], are_outputs: NDArray[np.bool_]) -> list[str]:
     """What is said of points that are not taken."""
-    computed = [label for label in labels if label in outputs and label not in names]
-    others = len(labels) - len(names) - len(computed)
+    computed = [label for k, label in enumerate(labels) if are_outputs[k] and k not in places]
+    others = len(labels) - len(places) - len(computed)
     remarks = [f"{others} markers without a name in the layout were left out"] if others else []
     if computed:
         remarks.append(f"{len(computed)} outputs of a model ({shortened(computed, 3)}) are no markers: they were left out")
@@ -85,10 +86,28 @@ def _size(frames: NDArray[np.float64], unit: str) -> list[str]:
     ]
 
 
-def _without_subject(labels: list[str]) -> list[str]:
-    """Names without the subject's (`Ada:chin`), where all that a person gave have the same."""
-    subjects = {label.rpartition(":")[0] for label in labels if label and not label.startswith("*")}
-    return [label.rpartition(":")[2] for label in labels] if len(subjects) == 1 else labels
+def _of_model(labels: list[str], listed: frozenset[str]) -> NDArray[np.bool_]:
+    """Which points are outputs: listed under their own name, else with a subject that only the list or only the label states."""
+    unmatched = listed - set(labels)
+    bare = {name for name in unmatched if ":" not in name}
+    of_subjects = {name.rpartition(":")[2] for name in unmatched if ":" in name}
+    return np.array(
+        [label in listed or (label.rpartition(":")[2] in bare if ":" in label else label in of_subjects) for label in labels],
+        bool,
+    )
+
+
+def _without_subject(labels: list[str], are_outputs: NDArray[np.bool_]) -> list[str]:
+    """Names without the subject's (`Ada:chin`), where all markers that a person named have the same."""
+    subjects = {
+        label.rpartition(":")[0]
+        for label, is_output in zip(labels, are_outputs, strict=True)
+        if label and not label.startswith("*") and not is_output
+    }
+    if len(subjects) != 1:
+        return labels
+    prefix = f"{subjects.pop()}:"
+    return [label.removeprefix(prefix) for label in labels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +172,7 @@ def _content(reader: Any, size: int) -> _Content:
         np.concatenate(analog, axis=1) if analog and reader.analog_used else np.zeros((0, 0)),
         [str(label).strip() for label in reader.analog_labels] if reader.analog_used else [],
         float(reader.analog_rate),
-        frozenset(label for kind in MODEL_OUTPUTS for label in _strings(reader, f"POINT:{kind}")),
+        frozenset(label for kind in MODEL_OUTPUTS for label in _strings(reader, kind)),
         remarks,
     )
 
@@ -204,21 +223,21 @@ def _of_length(kind: type, length: int) -> type:
 
 
 def _labels(reader: Any, count: int) -> list[str]:
-    """Names of the markers; beyond 255 they go on in LABELS2 and so on."""
-    labels: list[str] = []
-    for name in ("LABELS", *(f"LABELS{number}" for number in range(2, 10))):
-        labels += _strings(reader, f"POINT:{name}")
+    """Names of the points."""
+    labels = _strings(reader, "LABELS")
     return [*labels[:count], *(f"*{number}" for number in range(len(labels), count))]
 
 
 def _strings(reader: Any, name: str) -> list[str]:
-    found = reader.get(name)
-    return [str(label).strip() for label in found.string_array] if found is not None and found.dimensions else []
+    """A list of names in the group of points; beyond 255 it goes on in LABELS2 and so on."""
+    parts = (reader.get(f"POINT:{name}{number}") for number in ("", *range(2, 10)))
+    return [str(label).strip() for part in parts if part is not None and part.dimensions for label in part.string_array]
 
 
-def _named(path: Path, labels: list[str], outputs: frozenset[str]) -> tuple[str, ...]:
+def _named(path: Path, labels: list[str], are_outputs: NDArray[np.bool_]) -> tuple[str, ...]:
     """Every marker that a person named."""
-    named = [name for name in labels if name and not name.startswith("*") and name not in outputs]
+    markers = [label for label, is_output in zip(labels, are_outputs, strict=True) if not is_output]
+    named = [name for name in markers if name and not name.startswith("*")]
     if not named or len(set(named)) != len(named):
         raise FacesynthError(f"{path} names {len(set(named))} different markers of {len(named)}; name each of them once")
     return tuple(named)
