@@ -14,6 +14,8 @@ from facesynth.inference.errors import FacesynthError
 
 POLE_PER_10_MS = 0.94
 """Pole of the RASTA filter at 100 frames per second (integration over about 160 ms)."""
+FRAMES_TOGETHER = 1024
+"""Whose spectra are there at once: 10 s."""
 ROUNDING_POWER = 1.0 / (12.0 * 32768.0**2)
 """Power of the noise that rounding to 16 bits adds: the floor under digital silence."""
 
@@ -63,16 +65,19 @@ class RastaPlp(nn.Module):
 
     def forward(self, audio: Tensor) -> Tensor:
         """Audio [..., S], -1..1, to cepstra [..., 1 + S // hop, order + 1], float32."""
-        energies = self.band_energies(audio.to(torch.float64))
+        energies = self.band_energies(audio)
         filtered = self.filter_along_time(energies.log())
         return self.cepstra(torch.exp((filtered + self.loudness.log()) / 3)).to(torch.float32)
 
     def band_energies(self, audio: Tensor) -> Tensor:
-        """Audio [..., S] to the power in each critical band [..., frames, bands]."""
+        """Audio [..., S] to the power in each critical band [..., frames, bands], in double precision, some frames at a time."""
         length, half = len(self.window), len(self.window) // 2
         padded = functional.pad(audio, (half, length - half + self.hop))
         frames = padded.unfold(-1, length, self.hop)[..., : 1 + audio.shape[-1] // self.hop, :]
-        power = torch.fft.rfft(frames * self.window, self.fft).abs() ** 2
+        return torch.cat([self._energies_of(some) for some in frames.split(FRAMES_TOGETHER, dim=-2)], dim=-2)
+
+    def _energies_of(self, frames: Tensor) -> Tensor:
+        power = torch.fft.rfft(frames.to(self.window.dtype) * self.window, self.fft).abs() ** 2
         floor = ROUNDING_POWER * self.window.square().sum()
         return (power + floor) @ self.bands
 

@@ -57,6 +57,7 @@ class Chooser:
     def __init__(self, graph: Graph, maps: Maps) -> None:
         self.graph, self.maps = graph, maps
         self._known: dict[tuple[int, int], Candidates] = {}
+        self._ends: dict[int, tuple[Candidates, Floats, Floats, Floats]] = {}
 
     def candidates(self, phone: int, emotion: int) -> Candidates:
         """Nodes of the phone, else of its viseme class, else any; with the emotion, else mapped, else of any."""
@@ -83,6 +84,21 @@ class Chooser:
         if len(nodes):
             yield EMOTION_LEVELS[2], nodes, np.full(len(nodes), AS_RECORDED)
 
+    def ends(self, candidates: Candidates, metric: Floats) -> tuple[Floats, Floats]:
+        """[n, D] first and last frames of candidates, through their maps, times metric.
+
+        They are the same wherever a phone comes again, and kept once: of each phone of a long input they would be gigabytes.
+        """
+        known = self._ends.get(id(candidates))
+        if known is None or known[0] is not candidates or known[1] is not metric:
+            graph, nodes = self.graph, candidates.nodes
+            first, last = graph.frames[graph.starts[nodes]], graph.frames[graph.stops[nodes] - 1]
+            for number, which in candidates.by_map():
+                first[which] = self.maps.through(first[which], number)
+                last[which] = self.maps.through(last[which], number)
+            known = self._ends[id(candidates)] = candidates, metric, first @ metric, last @ metric
+        return known[2:]
+
     def motion(self, node: int, number: int) -> Floats:
         """[L, D] a node's motion, through its map."""
         return self.maps.through(self.graph.motion(node), number)
@@ -105,14 +121,9 @@ def make_step(
 
     expected: [frames, D] the pose that the sound leads one to expect, as components times metric.
     """
-    graph, nodes = chooser.graph, candidates.nodes
-    first, last = graph.frames[graph.starts[nodes]], graph.frames[graph.stops[nodes] - 1]
-    for number, which in candidates.by_map():
-        first[which] = chooser.maps.through(first[which], number)
-        last[which] = chooser.maps.through(last[which], number)
-    audio = chooser.sound_costs(wanted, nodes)
+    audio = chooser.sound_costs(wanted, candidates.nodes)
     pose = None if expected is None else pose_costs(chooser, candidates, expected, metric)
-    return Step(audio, first @ metric, last @ metric, _links(graph, candidates, before), pose)
+    return Step(audio, *chooser.ends(candidates, metric), _links(chooser.graph, candidates, before), pose)
 
 
 def pose_costs(chooser: Chooser, candidates: Candidates, expected: Floats, metric: Floats) -> Floats:
