@@ -74,7 +74,7 @@ class RastaPlp(nn.Module):
         length, half = len(self.window), len(self.window) // 2
         padded = functional.pad(audio, (half, length - half + self.hop))
         frames = padded.unfold(-1, length, self.hop)[..., : 1 + audio.shape[-1] // self.hop, :]
-        return torch.cat([self._energies_of(some) for some in frames.split(FRAMES_TOGETHER, dim=-2)], dim=-2)
+        return torch.cat([self._energies_of(some) for some in torch.split(frames, FRAMES_TOGETHER, dim=-2)], dim=-2)
 
     def _energies_of(self, frames: Tensor) -> Tensor:
         power = torch.fft.rfft(frames.to(self.window.dtype) * self.window, self.fft).abs() ** 2
