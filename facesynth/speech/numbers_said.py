@@ -32,7 +32,8 @@ _VERBS = {"march": "(?-i:March|MARCH)", "may": "(?-i:May|MAY)"}
 _MONTH = "|".join([*(_VERBS.get(month, month) for month in _MONTHS), r"sept\.?", r"(?-i:Mar|MAR)\.?",
                    *(f"{month[:3]}\\.?" for month in _MONTHS if month not in _VERBS)])  # fmt: skip
 _SIGNS = {"½": "1/2", "⅓": "1/3", "⅔": "2/3", "¼": "1/4", "¾": "3/4", "⅕": "1/5", "⅖": "2/5", "⅗": "3/5", "⅘": "4/5", "⅙": "1/6",
-          "⅚": "5/6", "⅐": "1/7", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8", "⅑": "1/9", "⅒": "1/10", "⁄": "/"}  # fmt: skip
+          "⅚": "5/6", "⅐": "1/7", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8", "⅑": "1/9", "⅒": "1/10"}  # fmt: skip
+_LOWERED = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _NUMBERED = "chapter|part|war|act|volume|book|scene|section|phase|type|title|level|stage|bowl|apollo|page|class|figure|table|step"
 _ROMAN = r"(?=[IVXL]{2,}\b|[VX]\b)(XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
@@ -47,6 +48,8 @@ def _read_table(name: str) -> dict[str, tuple[str, ...]]:
 _MONEY = _read_table("currencies.csv")
 """Unit and its hundredth, by sign and by code."""
 _UNITS = {sign: unit for sign, (unit,) in _read_table("units.csv").items()}
+_RATES = {"yr": "year", "mo": "month", "wk": "week", "hr": "hour", "sq": "square"}
+"""Short forms that stand behind a stroke alone, beside those of `_UNITS`."""
 _WHOLE = [*_UNITS.values(), *(unit for unit, _ in _MONEY.values())]
 _SINGULAR = {_PLURALS.get(unit, f"{unit}s"): unit for unit in _WHOLE if " " not in unit}
 """Units by their plural."""
@@ -56,13 +59,36 @@ Rule = tuple[str, Callable[[re.Match[str]], str]]
 
 def numbers_written_out(text: str) -> str:
     """Text with everything that has digits in words; letters that follow digits part from them."""
-    for sign, digits in _SIGNS.items():
-        text = re.sub(rf"(?<=\d)\s?{sign}", f" {digits}", text).replace(sign, digits)
-    text = re.sub(r"(?<=\d),(?=\d{1,2}\s?[€%])", ".", text)
-    text = re.sub(r"\b\d{1,3}(?:\.\d{3}){2,}\b", lambda match: match[0].replace(".", ""), text)
+    text = _signs_plain(_grouped_as_in_english(text))
     for pattern, said in _rules():
         text = re.sub(pattern, lambda match, said=said: f" {said(match)} ", text, flags=re.IGNORECASE)  # type: ignore[misc]
     return re.sub(_attributes(), lambda match: f"{match[1]}{_SINGULAR[match[2].lower()]} ", text)
+
+
+def _signs_plain(text: str) -> str:
+    """Fractions as two numbers and a stroke, and numbers below the line beside what they count."""
+    for sign, digits in _SIGNS.items():
+        text = re.sub(rf"(?<=\d)\s?{sign}", f" {digits}", text).replace(sign, digits)
+    text = re.sub(r"\bCO(?=2\b)", "C O ", text.replace("⁄", "/"))
+    text = re.sub(r"(\d/\d+)(?=[^\W\d_])", r"\1 ", text)
+    element = r"(?:[A-Z][a-z]?[₀-₉]*)"
+    text = re.sub(
+        rf"(?<!\w)(?=\w*[₀-₉]){element}+(?!\w)", lambda formula: " ".join(re.findall(r"[A-Za-z]|[₀-₉]+", formula[0])), text
+    )
+    return re.sub(r"[₀-₉]+", lambda number: f" {number[0].translate(_LOWERED)} ", text)
+
+
+def _grouped_as_in_english(text: str) -> str:
+    """Numbers with points or apostrophes between thousands and a comma before decimals, as in much of Europe."""
+    symbols = "".join(re.escape(sign) for sign in _MONEY if not sign.isalpha())
+    text = re.sub(r"(?<![\w'.,])\d{1,3}(?:'\d{3})+(?![\d'])", lambda number: number[0].replace("'", ""), text)
+    text = re.sub(
+        r"(?<![\d.,])(\d{1,3}(?:\.\d{3})+),(\d{1,2})(?!\d)", lambda number: f"{number[1].replace('.', '')}.{number[2]}", text
+    )
+    text = re.sub(r"(?<=€)(\s?\d{1,3})\.(\d{3})(?![\d.,/])|(?<![\d.,])(\d{1,3})\.(\d{3})(?=\s?€)", r"\1\2\3\4", text)
+    text = re.sub(rf"([{symbols}]\s?\d+),(\d{{1,2}})(?![\d,])", r"\1.\2", text)
+    text = re.sub(r"(?<=\d),(?=\d{1,2}\s?[€%])", ".", text)
+    return re.sub(r"\b\d{1,3}(?:\.\d{3}){2,}\b", lambda number: number[0].replace(".", ""), text)
 
 
 @cache
@@ -78,6 +104,8 @@ def _rules() -> tuple[Rule, ...]:
     symbols = "".join(re.escape(sign) for sign in _MONEY if not sign.isalpha())
     codes = "|".join(code for code in _MONEY if code.isalpha())
     units = "|".join(re.escape(unit) for unit in sorted(_UNITS, key=len, reverse=True))
+    scale = _SCALE.replace("(", "(?:")
+    money = rf"[{symbols}]\s?(?:{_N})(?:{scale})?|(?:{_N})(?:{scale})?\s?(?:[{symbols}]|(?:{codes})\b)"
     year = r"(1\d{3}|2\d{3})"
     return (
         (r"\b(\d{4})-(\d\d)-(\d\d)\b", lambda m: _date(m[3], m[2], m[1])),
@@ -91,11 +119,16 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b(\d{1,2}):(\d\d)(?::(\d\d))?(?:\s?([ap])\.?m\b\.?)?", lambda m: _time(m[1], m[2], m[3], m[4])),
         (r"\b(\d{1,2})\s?([ap])\.?m\b\.?", lambda m: f"{cardinal(m[1])} {m[2].lower()} m"),
         (r"\b(\d+):(\d+)\b", lambda m: f"{cardinal(m[1])} to {cardinal(m[2])}"),
-        (rf"(?<=\d)\s?[-–]\s?(?=[{symbols}]\.?\d)", lambda m: "to"),
         (
-            rf"([{symbols}])({_N})\s?[-–]\s?({_N})(?:{_SCALE})?",
-            lambda m: f"{cardinal(m[2])} to {_money(m[1], m[3], m[4] or m[5], None)}",
+            rf"((?:{money})|(?:{_N})\s?(?:{units}))\s?/\s?({units}|[a-z]+)\b",
+            lambda m: _rate(m[1], m[2]) if _is_rate(m[0]) else m[0],
         ),
+        (rf"((?:{_N})(?:{_SCALE})?)\s?[-–]\s?(?=[{symbols}]\.?\d)", lambda m: f"{m[1]} to"),
+        (
+            rf"([{symbols}])\s?({_N})(?:{_SCALE})?\s?[-–]\s?({_N})(?:{_SCALE})?",
+            lambda m: f"{_scaled(m[2], m[3] or m[4])} to {_money(m[1], m[5], m[6] or m[7], None)}",
+        ),
+        (rf"([{symbols}])\s?(\d+)\s(\d+)/(\d+)(?:{_SCALE})?", lambda m: _part_money(m[1], *m.group(2, 3, 4), m[5] or m[6])),
         (rf"(?<![\w)])-(?=[{symbols}]?\.?\d)", lambda m: "minus"),
         (rf"(?:\b([a-z]{{1,2}}))?([{symbols}])\s?({_N})(?:{_SCALE})?", lambda m: _money(m[2], m[3], m[4] or m[5], m[1])),
         (rf"({_N})(?:{_SCALE})?\s?([{symbols}]|(?:{codes})\b)", lambda m: _money(m[4].lower(), m[1], m[2] or m[3], None)),
@@ -106,6 +139,9 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b(1[1-9]\d0|20[1-9]0|[2-9]0)'?s\b", lambda m: _decade(m[1])),
         (rf"({_N})\s?(mm|cm|km|m|ft|in|mi|yd)([²³])", lambda m: _area(m[1], m[2].lower(), m[3])),
         (r"(\d+|[a-z])(⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda m: f"{m[1]} {_power(m[2].translate(_RAISED))}"),
+        (rf"({_N})\s?[-–]\s?(?=\d+\s+\d+/\d|(?:{_N})\s?[%‰°])", lambda m: f"{m[1]} to"),
+        (rf"\b(\d+)\s+(\d+)/(\d+)\b(?:\s?({units})(?![\w']))?", lambda m: _mixed(m[1], m[2], m[3], _unit(m[4]))),
+        (rf"\b(\d+)/(\d+)\s?(%|(?:{units})(?![\w']))", lambda m: _part_of(m[1], m[2], _unit(m[3]) or m[3])),
         (rf"({_N})\s?°\s?([cf])?\b", lambda m: _degrees(m[1], m[2])),
         (rf"({_N})\s?°", lambda m: _counted(m[1], "degree")),
         (rf"({_N})\s?%", lambda m: f"{cardinal(m[1])} percent"),
@@ -114,7 +150,6 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b(\d{3})-(\d{4})\b", lambda m: f"{_digits(m[1])} {_digits(m[2])}"),
         (rf"\b{year}\s?[-–]\s?{year}\b", lambda m: f"{_year(m[1])} to {_year(m[2])}"),
         (rf"({_N})\s?[-–]\s?({_N})(?![\w-])", lambda m: f"{m[1]} to {m[2]}"),
-        (r"\b(\d+)\s+(\d+)/(\d+)\b", lambda m: f"{cardinal(m[1])} and {_fraction(m[2], m[3], inside=True)}"),
         (r"\b24/7\b", lambda m: "twenty four seven"),
         (r"\b(\d+)/(\d+)\b", lambda m: _fraction(m[1], m[2])),
         (r"\b(\d[\d,]*)(?:st|nd|rd|th)\b", lambda m: ordinal(m[1])),
@@ -185,6 +220,45 @@ def _money(sign: str, amount: str, scale: str | None, country: str | None) -> st
         return _counted(str(cents), small)
     said = f"{cardinal(whole or '0')} {where}{_plural(unit, whole or '0')}"
     return f"{said} and {_counted(str(cents), small)}" if cents else said
+
+
+def _scaled(amount: str, scale: str | None) -> str:
+    return f"{cardinal(amount)} {_SCALES.get(scale.lower(), scale.lower())}" if scale else cardinal(amount)
+
+
+def _part_money(sign: str, whole: str, top: str, bottom: str, scale: str | None) -> str:
+    """`$2 1/2m`: two and a half million dollars."""
+    many = f" {_SCALES.get(scale.lower(), scale.lower())}" if scale else ""
+    return f"{_mixed(whole, top, bottom, None)}{many} {_plural(_MONEY[sign][0], '2')}"
+
+
+def _is_rate(text: str) -> bool:
+    """Whether a stroke behind an amount says per; km/h is a unit by itself, and `5 g/what` may be a choice."""
+    first, _, behind = text.partition("/")
+    known = behind.strip().lower() in {*_UNITS, *_RATES, *_UNITS.values(), *_RATES.values(), "day", "night"}
+    paid = any(sign in first.lower() for sign in _MONEY)
+    return paid or (known and f"{first.lstrip('0123456789., ')}/{behind}".lower() not in _UNITS)
+
+
+def _rate(amount: str, unit: str) -> str:
+    return f"{amount} per {_UNITS.get(unit.lower()) or _RATES.get(unit.lower(), unit)}"
+
+
+def _unit(short: str | None) -> str | None:
+    return "percent" if short == "%" else _UNITS[short.lower()] if short else None
+
+
+def _mixed(whole: str, top: str, bottom: str, unit: str | None) -> str:
+    said = f"{cardinal(whole)} and {_fraction(top, bottom, inside=True)}"
+    return f"{said} {_plural(unit, '2')}" if unit else said
+
+
+def _part_of(top: str, bottom: str, unit: str) -> str:
+    """Half a kilogram, three quarters of an ounce."""
+    if not 0 < int(top) < int(bottom):
+        return f"{_fraction(top, bottom)} {_plural(unit, '2')}"
+    one = f"{'an' if unit[0] in 'aeiou' or unit == 'hour' else 'a'} {unit}"
+    return f"half {one}" if (top, bottom) == ("1", "2") else f"{_fraction(top, bottom, inside=True)} of {one}"
 
 
 def _slashed(first: str, second: str, year: str) -> str:
