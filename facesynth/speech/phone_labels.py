@@ -48,6 +48,9 @@ QUIET = frozenset(
 UNCLEAR = frozenset(["spn", "<spn>", "<unk>", "unk", "[unk]", "oov", "<oov>", "+spn+", "<unknown>"])
 """Somebody speaks, and the aligner does not know what."""
 
+_QUESTION = re.compile(r"\?{2,}|[*+]+")
+"""What people write where they do not know what was said; a single ? is a sound in X-SAMPA."""
+
 _OTHER_NAMES: Mapping[str, str] = {
     **CLOSURES,
     **dict.fromkeys(QUIET | UNCLEAR | {"q"}, SILENCE),
@@ -58,6 +61,8 @@ _OTHER_NAMES: Mapping[str, str] = {
 _LIGATURES = str.maketrans({"ʧ": "tʃ", "ʤ": "dʒ", "ʦ": "ts", "ʣ": "dz", "ʨ": "tɕ", "ʥ": "dʑ", "\u02d0": "", "\u02d1": ""})
 _ARPABET_ALONE = frozenset(phone for phone in PHONES if len(phone) == 2) - {"pau", "el", "em", "en"}
 """Names that no other notation has; the others are letters that mean something else in IPA and X-SAMPA."""
+_DIGRAPHS = frozenset(["ch", "sh", "zh"])
+"""One sound in every spelling that writes them: of ARPAbet, and of pinyin; no two letters of IPA."""
 _SYLLABIC = {"l": "el", "ɫ": "el", "m": "em", "n": "en", "ŋ": "en", "r": "er", "ɹ": "er", "ɻ": "er"}
 _MOST_NAMED = 4
 
@@ -116,7 +121,7 @@ def label_remarks(labels: Iterable[str]) -> tuple[str, ...]:
     counted = Counter(label.strip() for label in labels)
     notation = notation_of(counted)
     foreign = {label: phone for label in counted if (phone := _approximated(label, notation))}
-    unclear = {label: count for label, count in counted.items() if label.lower() in UNCLEAR}
+    unclear = {label: count for label, count in counted.items() if _is_unclear(label.lower(), notation)}
     remarks = []
     if notation != "arpabet":
         remarks.append(f"the phones are read as {NOTATIONS[notation]}")
@@ -130,16 +135,23 @@ def label_remarks(labels: Iterable[str]) -> tuple[str, ...]:
     return tuple(remarks)
 
 
+def _is_unclear(plain: str, notation: Notation) -> bool:
+    return plain in UNCLEAR or bool(_QUESTION.fullmatch(plain)) or (plain == "?" and notation != "x_sampa")
+
+
 def _is_mark(plain: str) -> bool:
     """Whether a lower-case label stands for no sound of speech that one knows."""
     marked = len(plain) > 1 and plain[0] in "+[{(" and plain[-1] in "+]})"
-    return plain in QUIET or plain in UNCLEAR or marked or plain == SILENCE
+    quiet = plain in QUIET or plain in UNCLEAR or plain == SILENCE
+    return quiet or marked or bool(_QUESTION.fullmatch(plain))
 
 
 def _read(label: str, notation: Notation) -> str | None:
     name = unicodedata.normalize("NFC", label).strip()
     if _is_mark(name.lower()):
         return SILENCE
+    if name.lower().rstrip("0123456789") in _DIGRAPHS:
+        return name.lower().rstrip("0123456789")
     readers = {"arpabet": _by_name, "ipa": _in_ipa, "x_sampa": _in_x_sampa}
     order = [readers[notation], *(reader for other, reader in readers.items() if other != notation)]
     return next((phone for reader in order if (phone := reader(name))), None)
@@ -184,7 +196,13 @@ def _in_ipa(name: str) -> str | None:
         return _affricate(first, last)
     if first.vowel and (last.vowel or last.ipa in "jwɥɹ"):
         return _diphthong(first, last)
+    if len(sounds) == 3 and _is_obstruent(first) and _is_obstruent(sounds[-1]):
+        return None  # a syllable, no phone
     return _nearest(next(sound for sound in sounds if sound.vowel))
+
+
+def _is_obstruent(sound: Sound) -> bool:
+    return not sound.vowel and sound.open < 1
 
 
 def _affricate(stop: Sound, fricative: Sound) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
-from facesynth.speech.phone_labels import CLOSURES, normalise_phone, notation_of
+from facesynth.speech.phone_labels import CLOSURES, Notation, normalise_phone, notation_of
 
 Segment = tuple[str, float, float]
 """Label, start and end in seconds."""
@@ -18,15 +18,16 @@ TOUCHING_S = 1e-6
 SHORTEST_PHONE_S = 0.005
 
 
-def phone_track(segments: Iterable[Segment], duration_s: float | None = None) -> PhoneTrack:
+def phone_track(segments: Iterable[Segment], duration_s: float | None = None, notation: Notation | None = None) -> PhoneTrack:
     """The phones of labelled segments in order of time, any usual labels; gaps and the rest up to `duration_s` are silence.
 
+    notation: that of the labels; without it, it is seen in them.
     A stop's closure joins its release (`bcl b` is one b), neighbouring silences become one.
     FacesynthError where segments overlap, run backwards or bear an unknown label.
     """
     whole = list(_filled(segments, duration_s))
     raw = [label.strip().lower() for label, _ in whole]
-    notation = notation_of(label for label, _ in whole)
+    notation = notation or notation_of(label for label, _ in whole)
     labels: list[str] = []
     ends_s: list[float] = []
     for number, (label, end_s) in enumerate(whole):

@@ -12,10 +12,11 @@ from facesynth.encoding import decoded
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
-from facesynth.speech.phone_labels import label_remarks
+from facesynth.speech.phone_labels import label_remarks, notation_of
 from facesynth.speech.praat import read_grid
 from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of, with_confidences
 from facesynth.speech.tiers import following, tiers_of
+from facesynth.speech.unknown_labels import with_stand_ins
 
 Words = tuple[Segment, ...]
 """Word, start and end in seconds; silence between words is left out."""
@@ -56,9 +57,10 @@ def read_labelled(path: str | Path, duration_s: float | None = None, speaker: st
     said = following(_shifted(words.intervals if words else (), begin_s))[0]
     spoken = tuple((word.strip(), start_s, end_s) for word, start_s, end_s in said if not is_silence_mark(word))
     sure = _shifted(confidences.intervals, begin_s) if confidences else []
-    track, unsure = _with_confidences(_track(path, segments, grid.end_s - begin_s), sure)
+    known, unread = _track(path, segments, grid.end_s - begin_s)
+    track, unsure = _with_confidences(known, sure)
     labels = label_remarks(label for label, _, _ in segments)
-    told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels, *unsure)
+    told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels, *unread, *unsure)
     return Labelled(track, spoken, told)
 
 
@@ -119,8 +121,8 @@ def _from_lines(path: Path, duration_s: float | None) -> Labelled:
     start_s, end_s = (segments[0][1], segments[-1][2]) if segments else (0.0, 0.0)
     begin_s = _offset_s(start_s, end_s, duration_s)
     labels = label_remarks(label for label, _, _ in segments)
-    told = (*_encoded(encoding), *counted, *_moved(begin_s), *labels)
-    return Labelled(_track(path, _shifted(segments, begin_s), None), (), told)
+    track, unread = _track(path, _shifted(segments, begin_s), None)
+    return Labelled(track, (), (*_encoded(encoding), *counted, *_moved(begin_s), *labels, *unread))
 
 
 def _in_seconds(segments: list[Segment], duration_s: float | None) -> tuple[list[Segment], tuple[str, ...]]:
@@ -180,9 +182,13 @@ def _moved(begin_s: float) -> tuple[str, ...]:
     return (f"its times begin at {begin_s:g} s, as in a longer file; they were counted from 0",) if begin_s else ()
 
 
-def _track(path: Path, segments: Iterable[Segment], end_s: float | None) -> PhoneTrack:
+def _track(path: Path, segments: Iterable[Segment], end_s: float | None) -> tuple[PhoneTrack, tuple[str, ...]]:
+    """The phones, and what is said of labels that are none."""
     try:
-        return phone_track(segments, end_s)
+        given = list(segments)
+        notation = notation_of(label for label, _, _ in given)
+        known, remarks = with_stand_ins(given, notation)
+        return phone_track(known, end_s, notation), remarks
     except FacesynthError as error:
         raise FacesynthError(f"{path}: {error}") from None
 

@@ -6,6 +6,7 @@ from bringing import added, corpus_of, lay_down, spoken
 from grids import long_grid, put
 
 from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import viseme_of
 from facesynth.speech.phone_labels import label_remarks, normalise_phone, notation_of
 from facesynth.speech.textgrid import read_labelled
@@ -120,3 +121,44 @@ def test_the_table_is_whole():
         assert phone == "pau" or 1 <= viseme_of(phone) <= 14
         if row["x_sampa"]:
             assert normalise_phone(row["x_sampa"], "x_sampa") == phone, row
+
+
+@pytest.mark.parametrize(
+    ("labels", "strange", "phone"),
+    [
+        ("x ian4 m ü3 a1", "ian4", "aa"),
+        ("x uang4 m ü3 a1", "uang4", "aa"),
+        ("n iao3 sh ü3 i1", "iao3", "aw"),
+        ("HH XYZ AH0 L OW1", "XYZ", "uh"),
+        ("HH 4711 AH0 L OW1", "4711", "pau"),
+    ],
+)
+def test_one_unknown_label_is_told_and_does_not_refuse_the_file(tmp_path, labels, strange, phone):
+    read = read_labelled(put(tmp_path / "a.TextGrid", grid_of(labels.split())[0]))
+    assert read.phones.labels[1] == phone
+    assert len(read.phones) == 5
+    (said,) = (line for line in read.remarks if "no phones known here" in line)
+    assert f"{strange!r} (1) as {phone if phone != 'pau' else 'a rest of the lips'}" in said
+    lines = tmp_path / "a.lab"
+    lines.write_text("\n".join(f"{0.2 * k + 0.2:.1f} {label}" for k, label in enumerate(labels.split())), encoding="utf-8")
+    again = read_labelled(lines)
+    assert again.phones.labels == read.phones.labels
+    assert said in again.remarks
+
+
+@pytest.mark.parametrize("label", ["???", "??", "?", "*", "+++"])
+def test_question_marks_are_told_as_unclear(tmp_path, label):
+    read = read_labelled(put(tmp_path / "a.TextGrid", grid_of(["HH", "AH0", label, "L", "OW1"])[0]))
+    assert read.phones.labels == ("hh", "ah", "pau", "l", "ow")
+    assert read.remarks == (f"what is said at {label!r} (1) is not known; the lips rest there",)
+
+
+def test_a_tier_of_words_is_no_tier_of_phones(tmp_path):
+    path = put(tmp_path / "a.TextGrid", grid_of(["sil", "hello", "a", "wonderful", "sil", "world", "to", "you"])[0])
+    with pytest.raises(FacesynthError, match=r"a.TextGrid: unknown phone 'hello'"):
+        read_labelled(path)
+
+
+def test_digraphs_are_one_sound_among_ipa_too(tmp_path):
+    read = read_labelled(put(tmp_path / "a.TextGrid", grid_of(["zh", "ü3", "sh", "a1", "ch", "i4"])[0]))
+    assert read.phones.labels[::2] == ("zh", "sh", "ch")
