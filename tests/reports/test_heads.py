@@ -24,7 +24,7 @@ from heads import (
 
 from facesynth.face.rig.channel_map import arkit_name
 from facesynth.face.rig.own_head import load_own_head
-from facesynth.face.rig.presets import PRESETS, fitting
+from facesynth.face.rig.presets import PRESETS, fitting, preset
 from facesynth.inference.errors import FacesynthError
 
 OPENING = slice(10, 25)
@@ -58,10 +58,10 @@ def test_names_wherever_they_stand(tmp_path, said, place):
 
 def test_avatars_by_their_first_bytes(tmp_path, said):
     older, newer = head(tmp_path / "old.vrm", vrm0), head(tmp_path / "new.vrm", vrm1)
-    for path, opening, preset in ((older, "a", "vrm0"), (newer, "aa", "vrm1")):
+    for path, opening, chosen in ((older, "a", "vrm0"), (newer, "aa", "vrm1")):
         channels, told = said(path)
         assert channels[opening][OPENING].max() > 0.5
-        assert any(f"follow the preset {preset}" in line for line in told)
+        assert any(f"follow the preset {chosen}" in line for line in told)
     odd = head(tmp_path / "binary.gltf")
     assert load_own_head(odd).names == TALKING
 
@@ -152,6 +152,8 @@ def test_joints_that_cannot_be_turned_are_told(tmp_path, joint, said_of_it):
     ("preset", "names"),
     [
         ("cc4", ("Jaw_Open", "Mouth_Pucker_Up_L", "Mouth_Funnel_Up_R", "Brow_Drop_L", "Mouth_Down_Lower_L")),
+        ("cc4", ("V_Open", "V_Explosive", "V_Tight_O", "V_Wide", "V_Dental_Lip")),
+        ("facs", ("AU25_r", "AU26_r", "AU12_r", "AU45_c", "AU20_r")),
         ("vrm0", ("Fcl_MTH_A", "Fcl_MTH_U", "Fcl_MTH_O", "Fcl_EYE_Close_L", "Fcl_ALL_Fun")),
         ("vrm1", ("aa", "ih", "ou", "ee", "blinkLeft")),
         ("mmd", ("あ", "う", "お", "ウィンク２右", "まばたき")),
@@ -182,11 +184,30 @@ def test_a_preset_is_chosen_where_it_fits_best_and_told(tmp_path, said, preset, 
         ("A25_Jaw_Open", "jawOpen"), ("A14_Eye_Blink_Left", "eyeBlinkLeft"), ("head_lod0_mesh__jawOpen", "jawOpen"),
         ("jawOpen.001", "jawOpen"), ("eyeBlink.L", "eyeBlinkLeft"), ("eyeBlinkR", "eyeBlinkRight"),
         ("Face:mouthSmile_R", "mouthSmileRight"),
-        ("blendShape1.mouthFunnel", "mouthFunnel"), ("MOUTH_PUCKER", "mouthPucker"), ("Frozen", None), ("mouthOpen", None),
+        ("blendShape1.mouthFunnel", "mouthFunnel"), ("MOUTH_PUCKER", "mouthPucker"),
+        ("JawOpen_1", "jawOpen"), ("jaw_open_blendshape", "jawOpen"), ("jawOpenBlendShape", "jawOpen"),
+        ("eyeBlink_L_2", "eyeBlinkLeft"), ("mouth_smile_right_shape", "mouthSmileRight"),
+        ("AU25_r", None), ("Frozen", None), ("mouthOpen", None),
     ],
 )  # fmt: skip
 def test_names_of_arkit_in_disguise(name, meant):
     assert arkit_name(name) == meant
+
+
+def test_the_end_of_an_action_unit_is_a_side_only_beside_the_other_side():
+    def weights(*names):
+        return {name: set(way.shares) for name, way in preset("facs", names).channels.items()}
+
+    both = {"mouthSmileLeft", "mouthSmileRight"}
+    assert weights("AU12_r", "AU12_c", "AU26_r") == {"AU12_r": both, "AU12_c": both, "AU26_r": {"jawOpen"}}
+    assert weights("AU1", "AU4_L", "AU2R") == {"AU1": {"browInnerUp"}, "AU4_L": {"browDownLeft"}, "AU2R": {"browOuterUpRight"}}
+    assert weights("AU12_l", "AU12_r") == {"AU12_l": {"mouthSmileLeft"}, "AU12_r": {"mouthSmileRight"}}
+    assert weights("AU12_L", "AU12_R") == {"AU12_L": {"mouthSmileLeft"}, "AU12_R": {"mouthSmileRight"}}
+
+
+def test_visemes_of_character_creator_do_not_move_a_mouth_that_others_move():
+    names = ("Jaw_Open", "Mouth_Close", "Mouth_Funnel_Up_L", "Mouth_Funnel_Up_R", "V_Open", "V_Explosive", "V_Tight_O", "V_Wide")
+    assert {name for name in preset("cc4", names).channels if name.startswith("V_")} == {"V_Wide"}
 
 
 def test_a_head_with_all_of_arkit_needs_no_preset():

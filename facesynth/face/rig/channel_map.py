@@ -13,6 +13,7 @@ from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
 _SIDES = {"l": "Left", "r": "Right"}
+_ENDINGS = re.compile(r"(?:[_ .-](?:blend_?shapes?|shapes?|morphs?|targets?|\d{1,2})|blendshape)+$", re.IGNORECASE)
 RIDGE = 1e-4
 """Price of a weight where own channels are turned into ARKit's: it decides only what they leave open."""
 
@@ -139,12 +140,22 @@ def folded_names(name: str) -> Iterator[str]:
     """What a name may say, small letters and digits (of any script, of one width) alone, the whole first.
 
     Without Blender's `.001`, without what mesh or exporter put before it (`head_lod0_mesh__`, `Face.`, `A25_`), and `_L`,
-    `.R` or `L` as left and right.
+    `.R` or `L` as left and right. Then without endings that say no more than what it is: `_1`, `_blendshape`, and the `_r`
+    and `_c` of OpenFace's action units, which are intensity and presence, no sides.
     """
-    text = re.sub(r"\.\d{3}$", "", normalize("NFKC", name).strip())
-    text = re.sub(r"(?:[_ .-]([LRlr])|(?<=[a-z])([LR]))$", lambda side: _SIDES[(side[1] or side[2]).lower()], text)
+    whole = re.sub(r"\.\d{3}$", "", normalize("NFKC", name).strip())
+    yield from dict.fromkeys(plain for text in (whole, _ENDINGS.sub("", whole)) for plain in _without_starts(_sided(text)))
+
+
+def _sided(text: str) -> str:
+    text = re.sub(r"(?<![A-Za-z])(AU)(?=\d(?!\d))", r"\g<1>0", text, flags=re.IGNORECASE)
+    text = re.sub(r"(?<![A-Za-z])(AU\d\d)[_ .-]([LR])$", r"\1\2", re.sub(r"(AU\d\d)_[rc]$", r"\1", text))
+    return re.sub(r"(?:[_ .-]([LRlr])|(?<=[a-z])([LR]))$", lambda side: _SIDES[(side[1] or side[2]).lower()], text)
+
+
+def _without_starts(text: str) -> Iterator[str]:
     starts = [0, *(match.end() for match in re.finditer(r"__|[_:|./ -]", text))]
-    yield from dict.fromkeys(plain for start in starts if (plain := re.sub(r"[\W_]", "", text[start:].lower())))
+    yield from (plain for start in starts if (plain := re.sub(r"[\W_]", "", text[start:].lower())))
 
 
 def _by_name(name: str) -> Channel:

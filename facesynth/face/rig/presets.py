@@ -1,5 +1,6 @@
 """Mappings for heads of usual makers, as files beside this module: by name, or the one that fits a head best."""
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
@@ -13,6 +14,10 @@ PRESETS = ("cc4", "facs", "metahuman", "vrm1", "vrm0", "readyplayerme", "oculus"
 """Where two fit as well, the first is taken."""
 ENOUGH = 15
 """A head with so many of ARKit's names is driven by those; visemes that it has beside them would move the mouth twice."""
+_VISEME = re.compile(r"(?:^|[_:|./ -])V_[A-Z]")
+"""Visemes of Character Creator."""
+_LEFT_UNIT = re.compile(r"AU\d{1,2}_[lL]$")
+"""Beside it `AU12_r` is the right side, and not OpenFace's intensity of both."""
 JAW = "jawOpen"
 FEWEST = 3
 """Channels that a preset must drive, or half of them all, to be chosen by itself."""
@@ -73,9 +78,24 @@ def _beside(ways: Mapping[str, Channel], by_name: Mapping[str, str]) -> dict[str
 
 
 def _matched(name: str, channels: Sequence[str]) -> dict[str, Channel]:
-    ways = _ways(name)
-    found = {channel: next((ways[plain] for plain in folded_names(channel) if plain in ways), None) for channel in channels}
-    return {channel: way for channel, way in found.items() if way is not None}
+    ways, sided = _ways(name), any(_LEFT_UNIT.search(channel) for channel in channels)
+    found = {
+        channel: next((ways[plain] for plain in folded_names(channel.upper() if sided else channel) if plain in ways), None)
+        for channel in channels
+    }
+    return _visemes_alone({channel: way for channel, way in found.items() if way is not None}, channels)
+
+
+def _visemes_alone(ways: Mapping[str, Channel], channels: Sequence[str]) -> dict[str, Channel]:
+    """Without those visemes `V_…` whose weights move other channels of the head: they would move the mouth twice."""
+    visemes = {channel for channel in ways if _VISEME.search(channel)}
+    taken = {arkit for channel in channels if channel not in visemes and (arkit := arkit_name(channel))}
+    taken.update(weight for channel, way in ways.items() if channel not in visemes for weight in way.shares)
+    return {
+        channel: way
+        for channel, way in ways.items()
+        if channel not in visemes or not taken & {weight for weight, share in way.shares.items() if share > 0}
+    }
 
 
 @cache
