@@ -31,6 +31,10 @@ HEAD_BYTES = 1 << 14
 PER_CENT = 2.0
 """No weight of shares goes beyond it."""
 LARGEST_PER_CENT = 110.0
+DOUBTFUL = 3.0
+"""Below it the highest weight may be per cent of a quiet face, or a share that was exaggerated."""
+FEW_OVER = 0.02
+"""A larger share of weights over 1 is more than some that were captured a little beyond it."""
 CLIPPED = 1.001
 RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
 """Frames that time codes count in a second."""
@@ -178,10 +182,13 @@ def as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floa
     highest = float(weights.max(initial=0.0))
     if highest > LARGEST_PER_CENT or weights.min(initial=0.0) < -LARGEST_PER_CENT:
         raise FacesynthError(f"{path} holds weights up to {max(highest, -weights.min()):g}; wanted 0 to 1, or per cent")
+    said = f"weights go up to {highest:g}"
+    over = float((weights > CLIPPED).mean()) if weights.size else 0.0
     if highest > PER_CENT:
-        shares = np.where(are_weights, values / 100, values)
-        return shares, [f"weights go up to {highest:g}: they were taken as per cent and divided by 100"]
-    return values, [f"weights go up to {highest:g}: those over 1 are taken as 1"] if highest > CLIPPED else []
+        doubt = ", which is doubtful: if they are exaggerated shares, clip them at 1" if highest < DOUBTFUL else ""
+        return np.where(are_weights, values / 100, values), [f"{said}: they were taken as per cent and divided by 100{doubt}"]
+    doubt = f", which is doubtful for {over:.0%} of all: if they are per cent of a quiet face, divide by 100"
+    return values, [f"{said}: those over 1 are taken as 1{doubt if over > FEW_OVER else ''}"] if highest > CLIPPED else []
 
 
 def _times(path: Path, timecodes: list[str], fps: float | None) -> tuple[Floats, int]:

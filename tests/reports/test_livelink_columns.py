@@ -61,6 +61,20 @@ def test_per_cent_is_told_and_divided(tmp_path):
     assert "those over 1 are taken as 1" in read(write(tmp_path / "c.csv", CODES, loud)).remarks[0]
 
 
+@pytest.mark.parametrize(("scale", "taken"), [(1.8, "taken as 1"), (2.6, "taken as per cent")])
+def test_many_weights_a_little_over_1_are_told_as_doubtful(tmp_path, scale, taken):
+    """Per cent of a quiet face, or shares that somebody exaggerated: both look like this."""
+    scaled = np.concatenate([scale * VALUES[:, :52], VALUES[:, 52:]], axis=1)
+    doubts = [line for line in read(write(tmp_path / "a.csv", CODES, scaled)).remarks if "doubtful" in line]
+    assert len(doubts) == 1
+    assert taken in doubts[0]
+    assert "\n" not in doubts[0]
+    few = np.where(np.arange(61) == 17, 1.4 * VALUES, VALUES)
+    assert not any("doubtful" in line for line in read(write(tmp_path / "b.csv", CODES, few)).remarks)
+    loud = np.concatenate([100 * VALUES[:, :52], VALUES[:, 52:]], axis=1)
+    assert not any("doubtful" in line for line in read(write(tmp_path / "c.csv", CODES, loud)).remarks)
+
+
 def test_the_52_weights_alone(tmp_path):
     reading = read(write(tmp_path / "a.csv", CODES, VALUES[:, :52], WEIGHTS))
     assert len(reading.motion.layout.names) == 52

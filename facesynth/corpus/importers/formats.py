@@ -139,7 +139,7 @@ def _with_shares(path: Path, reading: Reading) -> Reading:
     if sum(are_weights) < FEWEST_SHAPES:
         return reading
     values, said = as_shares(path, np.nan_to_num(motion.frames.astype(np.float64)), are_weights)
-    if not any("per cent" in line for line in said):
+    if not any("taken as per cent" in line for line in said):
         return reading
     frames = np.where(np.isnan(motion.frames), np.nan, values)
     shares = motion_of_arrays(path, frames, motion.fps, motion.layout, motion.head, motion.eyes)
