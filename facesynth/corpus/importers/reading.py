@@ -13,6 +13,7 @@ from facesynth.inference.motion import Motion
 from facesynth.inference.npz import LARGEST_BYTES
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.gaps import filled_in
+from facesynth.motion.placeholders import placeholders
 from facesynth.speech.segments import Segment
 
 SLOWEST_HZ, FASTEST_HZ = 1.0, 10000.0
@@ -83,8 +84,12 @@ def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
 
 def open_gaps(points: NDArray[np.floating]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
     """Markers [T, K, 3] with NaN where programs wrote a number for a gap, and what is said of it."""
-    unseen = filled_in(points) & ~by_blocks(lambda some: np.asarray(np.isnan(some).any(axis=2)), points, bool)
-    if not unseen.any():
-        return points, ()
-    said = f"{np.count_nonzero(unseen)} samples are 0, 0, 0 or far from the face, as programs write gaps: they are gaps"
-    return np.where(unseen[..., None], np.nan, points), (said,)
+    far = filled_in(points)
+    near = placeholders(points, far)
+    far &= ~by_blocks(lambda some: np.asarray(np.isnan(some).any(axis=2)), points, bool)
+    ways = (
+        (far, "are 0, 0, 0 or far from the face, as programs write gaps"),
+        (near, "stand exactly still outside of the face while others move, as numbers that programs write for gaps"),
+    )
+    said = tuple(f"{np.count_nonzero(mask)} samples {what}: they are gaps" for mask, what in ways if mask.any())
+    return (np.where((far | near)[..., None], np.nan, points), said) if said else (points, ())
