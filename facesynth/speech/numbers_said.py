@@ -128,7 +128,7 @@ def _rules() -> tuple[Rule, ...]:
             rf"([{symbols}])\s?({_N})(?:{_SCALE})?\s?[-–]\s?({_N})(?:{_SCALE})?",
             lambda m: f"{_scaled(m[2], m[3] or m[4])} to {_money(m[1], m[5], m[6] or m[7], None)}",
         ),
-        (rf"([{symbols}])\s?(\d+)\s(\d+)/(\d+)(?:{_SCALE})?", lambda m: _part_money(m[1], *m.group(2, 3, 4), m[5] or m[6])),
+        (rf"([{symbols}])\s?(\d+)\s(\d+)/(\d+)(?:{_SCALE})?", lambda m: _part_money(m[1], m[2], m[3], m[4], m[5] or m[6])),
         (rf"(?<![\w)])-(?=[{symbols}]?\.?\d)", lambda m: "minus"),
         (rf"(?:\b([a-z]{{1,2}}))?([{symbols}])\s?({_N})(?:{_SCALE})?", lambda m: _money(m[2], m[3], m[4] or m[5], m[1])),
         (rf"({_N})(?:{_SCALE})?\s?([{symbols}]|(?:{codes})\b)", lambda m: _money(m[4].lower(), m[1], m[2] or m[3], None)),
