@@ -17,7 +17,6 @@ from scipy.signal import find_peaks
 from facesynth.speech.audio import load_audio
 from facesynth.speech.decoder_recognition import recognise_by_decoder
 from facesynth.speech.phone_sources import find_phones
-from facesynth.speech.recognition import recognise
 
 PRESSED = ("mouth_press_l", "mouth_press_r")
 LEAST, APART = 0.04, 3
@@ -39,7 +38,7 @@ def main() -> None:
         audio, rate = load_audio(path)
         text = (options.texts / f"{path.stem}.txt").read_text(encoding="utf-8")
         tracks = {
-            "the network": recognise(audio, rate, fit=False),
+            "the network": find_phones(audio, rate).phones,
             "with the text": find_phones(audio, rate, text=text, language="zh").phones,
         }
         if options.pocketsphinx:

@@ -105,8 +105,10 @@ def main() -> None:
         "network": partial(recognise, fit=False),
         "network, fitted": recognise,
     }
-    for name, clips in sets.items():
-        report(name, clips, ways)
+    scores = {name: report(name, clips, ways) for name, clips in sets.items()}
+    for way in ways:
+        both = [scores[name][way] for name in ("grid_s1", "ravdess_speech")]
+        print(f"\n{way}, mean of GRID and RAVDESS: {means(both)}")
     report_marks(sets["haskins_ema"])
     few = [clip for name in ("grid_s1", "ravdess_speech") for clip in evenly(sets[name], options.few)]
     report("streams", few, {f"look-ahead {ahead_s} s": partial(streamed, ahead_s=ahead_s) for ahead_s in (0.1, 0.2, 0.4, 0.8)})
@@ -138,13 +140,22 @@ def judged(clip: Clip) -> Iterator[tuple[float, bool]]:
             yield float(sure), label in over
 
 
-def report(name: str, clips: list[Clip], ways: dict[str, Hear]) -> None:
+def report(name: str, clips: list[Clip], ways: dict[str, Hear]) -> dict[str, Score]:
     print(f"\n{name}: {len(clips)} clips")
+    scores = {way: Score() for way in ways}
     for way, hear in ways.items():
-        score = Score()
         for clip in clips:
-            score.add(clip, hear)
-        print(f"  {way:20s} {score}", flush=True)
+            scores[way].add(clip, hear)
+        print(f"  {way:20s} {scores[way]}", flush=True)
+    return scores
+
+
+def means(scores: list[Score]) -> str:
+    """Errors as the mean of the sets, closures of all sets together."""
+    per = np.mean([score.wrong / max(score.phones, 1) for score in scores])
+    ver = np.mean([score.wrong_visemes / max(score.visemes, 1) for score in scores])
+    right, wanted, got = (sum(getattr(score, part) for score in scores) for part in ("met", "closures", "heard_closures"))
+    return f"PER {per:.3f}  VER {ver:.3f}  closures {right / max(wanted, 1):.3f} / {right / max(got, 1):.3f} of {wanted}"
 
 
 def streamed(audio: np.ndarray, rate: int, ahead_s: float) -> PhoneTrack:
@@ -190,23 +201,26 @@ def evenly(whole: list[T], count: int) -> list[T]:
 def conditions(clips: list[Clip]) -> dict[str, Callable[[Clip], Clip]]:
     rng = np.random.default_rng(0)
 
-    def noisy(clip: Clip, decibel: float, noise: Callable[[int], np.ndarray]) -> Clip:
-        added = noise(len(clip.audio))
+    def noisy(clip: Clip, decibel: float, noise: Callable[[Clip], np.ndarray]) -> Clip:
+        added = noise(clip)
         gain = np.sqrt(np.mean(clip.audio**2) / np.mean(added**2)) * 10 ** (-decibel / 20)
         return Clip((clip.audio + gain * added).astype(np.float32), clip.rate, clip.truth)
 
-    def babble(length: int) -> np.ndarray:
-        others = [clips[i].audio for i in rng.choice(len(clips), 6)]
-        return np.sum([np.resize(audio / audio.std(), length) for audio in others], axis=0)
+    def white(clip: Clip) -> np.ndarray:
+        return rng.standard_normal(len(clip.audio))
+
+    def babble(clip: Clip) -> np.ndarray:
+        others = [other.audio for other in clips if other is not clip]
+        six = [others[i] for i in rng.choice(len(others), 6)]
+        return np.sum([np.resize(audio / audio.std(), len(clip.audio)) for audio in six], axis=0)
 
     def telephone(clip: Clip) -> Clip:
         heard = bandpass_biquad(torch.from_numpy(clip.audio), clip.rate, 1010.0, 1010 / 3100)
         return Clip(resample(heard.numpy(), clip.rate, 8000), 8000, clip.truth)
 
-    white = partial(noisy, noise=rng.standard_normal)
     return {
         "clean": lambda clip: clip,
-        **{f"white noise, {level} dB": partial(white, decibel=level) for level in (20, 10, 5)},
+        **{f"white noise, {level} dB": partial(noisy, decibel=level, noise=white) for level in (20, 10, 5)},
         **{f"babble of six, {level} dB": partial(noisy, decibel=level, noise=babble) for level in (20, 10, 5)},
         "telephone band": telephone,
         "a quarter faster": partial(paced, factor=1.25),

@@ -1,12 +1,14 @@
 """Rows of phones laid beside each other, against a literal version of the recursion; and passages that one of them lacks."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from facesynth.inference.phones import PHONES, VOWELS, viseme_of
 from facesynth.inference.spikes import Spike
+from facesynth.speech import recognition
 from facesynth.speech.passages import follow
 from facesynth.speech.phone_matching import MISSED, PASSAGE, PASSED, match
 from facesynth.speech.pronunciation import pronounce
@@ -137,3 +139,15 @@ def test_a_passage_in_place_of_another_and_another_text():
     assert lacking.start_s == pytest.approx(starts_s[40], abs=1.2)
     assert lacking.end_s == pytest.approx(starts_s[60], abs=1.2)
     assert follow(silence(spikes), RATE, list(others) * 6, spikes) is None
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.1, True), (0.3, False)])
+def test_a_fit_far_from_where_phones_are_heard_is_not_believed(monkeypatch, share, believed):
+    heard = [Spike("t", 0.1 * k, 0.1 * k + 0.02, 0.9, k % 3 == 0) for k in range(1, 21)]
+    near = [(spike.phone, spike.first_s, spike.last_s) for spike in heard]
+    moved = [
+        (label, start + 0.06 * (k < 20 * share), stop + 0.06 * (k < 20 * share)) for k, (label, start, stop) in enumerate(near)
+    ]
+    monkeypatch.setattr(recognition, "fit_phones", lambda *_: SimpleNamespace(phones=tuple(moved)))
+    found = recognition._fitted(np.zeros(40000, np.float32), 16000, heard, near)
+    assert found == (moved if believed else near)
