@@ -155,11 +155,12 @@ def _unknown(audio: NDArray[np.float32], rate: int) -> FoundPhones:
 
 
 def _listened(audio: NDArray[np.float32], rate: int) -> FoundPhones:
-    """Around the network's spikes, and a remark on what is no speech alone."""
+    """Around the network's spikes, for models that the sound moves."""
     from facesynth.speech.recognition import placed, speech_in
 
     heard, doubts = speech_in(audio, rate)
-    return FoundPhones(placed(audio, rate, heard, fit=False), (), doubts, "listening")
+    remark = "nobody gave the words, and none are needed: the sound moves the face; what is heard says where lips shut and rest"
+    return FoundPhones(placed(audio, rate, heard, fit=False), (), (remark, *doubts), "listening")
 
 
 def _heard(audio: NDArray[np.float32], rate: int) -> FoundPhones:
