@@ -20,7 +20,7 @@ from facesynth.corpus.importers.formats import read
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
-KINDS = ("livelink", "table", "npz", "mat", "beat", "c3d")
+KINDS = ("livelink", "table", "npz", "mat", "beat", "c3d", "openface")
 MOST_BYTES, MOST_S, MOST_LETTERS = 1 << 30, 10, 600
 CELLS = (
     " ",
@@ -65,6 +65,10 @@ def whole(kind, folder):
     elif kind == "beat":
         frames = [{"weights": row.tolist(), "time": k / 60, "rotation": []} for k, row in enumerate(weights)]
         path.write_text(json.dumps({"names": list(ARKIT_NAMES), "frames": frames}), encoding="utf-8")
+    elif kind == "openface":
+        from openface_files import openface
+
+        openface(path)
     else:
         from mocap_files import write_c3d
 
@@ -74,14 +78,20 @@ def whole(kind, folder):
 
 
 def suffix(kind):
-    return {"livelink": "csv", "table": "csv", "beat": "json"}.get(kind, kind)
+    return {"livelink": "csv", "table": "csv", "beat": "json", "openface": "csv"}.get(kind, kind)
 
 
 def changed(kind, content, rng):
     """The file with one thing changed."""
     if rng.random() < 0.1:
         return cut_or_grown(content, rng)
-    ways = {"livelink": table_changed, "table": table_changed, "npz": npz_changed, "beat": json_changed}
+    ways = {
+        "livelink": table_changed,
+        "table": table_changed,
+        "openface": table_changed,
+        "npz": npz_changed,
+        "beat": json_changed,
+    }
     return ways.get(kind, words_changed)(content, rng)
 
 
@@ -185,7 +195,7 @@ def tried(kind, content, path):
     path.write_bytes(content)
     try:
         with np.errstate(all="ignore"):
-            reading = read(path, fps=None if kind == "livelink" else 30.0)
+            reading = read(path, fps=None if kind in ("livelink", "openface") else 30.0)
     except FacesynthError as error:
         assert "\n" not in str(error), str(error)
         assert len(str(error)) < MOST_LETTERS + len(str(path)), str(error)[:2000]
