@@ -82,15 +82,27 @@ def demo(output: Path, seed: int, size: tuple[int, int] | None, as_json: bool) -
 
 
 def _said_by_default(output: Path, speech: Speech, stage: HeadStage) -> Path:
-    """A video of the model of those who name none: a face before anything is learned."""
-    from facesynth.inference.speech import EmotionTrack
+    """A video of the model of those who name none, of the first sentence: a face before anything is learned."""
     from facesynth.stage.cast import Cast
     from facesynth.zoo.shelf import DEFAULT, load
 
     model, path = load(), output / f"{DEFAULT}.mp4"
-    plain = replace(speech, emotions=EmotionTrack.constant(model.emotions[0], speech.duration_s))
+    plain = _first_sentence(speech, model.emotions[0])
     stage.perform(model.synthesize(plain), plain, Cast(model)).write(path)
     return path
+
+
+def _first_sentence(speech: Speech, emotion: str) -> Speech:
+    """What is said in the first emotion of the track, in the one that is given."""
+    import numpy as np
+
+    from facesynth.inference.speech import EmotionTrack, PhoneTrack
+
+    stop_s, ends_s = float(speech.emotions.ends_s[0]), speech.phones.ends_s
+    count = int(np.searchsorted(ends_s, stop_s)) + 1
+    phones = PhoneTrack(speech.phones.labels[:count], np.minimum(ends_s[:count], stop_s))
+    audio = speech.audio[: round(stop_s * speech.sample_rate)]
+    return replace(speech, audio=audio, phones=phones, emotions=EmotionTrack.constant(emotion, stop_s))
 
 
 def _strip(path: Path, performance: Performance, rig: Rig) -> Path:
