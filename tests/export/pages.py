@@ -1,5 +1,6 @@
 """Pages of the examples in a real browser with the network cut off, and what npm brings for them."""
 
+import fcntl
 import functools
 import http.server
 import json
@@ -19,17 +20,27 @@ WAIT_S = 90
 
 
 def installed(example):
-    """The example's folder with what npm installs; skips where that cannot be had."""
+    """The example's folder with what npm installs; skips where that cannot be had. Processes beside this one wait for it."""
     npm = shutil.which("npm")
     if npm is None:
         pytest.skip("npm is not installed")
     folder = EXAMPLES / example
-    if not (folder / "node_modules" / "onnxruntime-web").is_dir():
-        command = [npm, "install", "--no-audit", "--no-fund", "--ignore-scripts"]
-        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=1800)
-        if done.returncode:
-            pytest.skip(f"npm cannot install onnxruntime-web here: {done.stderr.strip()[-200:]}")
+    with (folder / "package.json").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if not (folder / "node_modules" / ".package-lock.json").is_file():  # what npm writes last
+            command = [npm, "install", "--no-audit", "--no-fund", "--ignore-scripts"]
+            done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=1800)
+            if done.returncode:
+                pytest.skip(f"npm cannot install onnxruntime-web here: {done.stderr.strip()[-200:]}")
     return folder
+
+
+def said_by_node(script, *arguments):
+    """What a script of the Node example prints, read as JSON."""
+    command = [shutil.which("node"), script, *map(str, arguments)]
+    done = subprocess.run(command, cwd=installed("node"), check=False, capture_output=True, text=True, timeout=1800)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 def a_browser():

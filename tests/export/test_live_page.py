@@ -1,14 +1,13 @@
 """Microphone to phones to face in a page, and the same stream in Node: what the runtime's stream hears, with the network cut."""
 
 import base64
-import json
 import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from pages import a_browser, colours, installed, visited
+from pages import a_browser, colours, installed, said_by_node, visited
 
 from facesynth.inference import load
 from facesynth.inference.phones import BILABIALS
@@ -41,9 +40,7 @@ def test_node_hears_in_pieces_what_the_runtime_hears(spoken, piece, tmp_path):
     from facesynth.export.phones import export_phones
 
     export_phones(tmp_path / "hearing", "float16")
-    command = [shutil.which("node"), "hear.mjs", str(tmp_path / "hearing"), str(spoken), str(piece)]
-    done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=1800)
-    got, wanted = json.loads(done.stdout), heard(tmp_path / "hearing", spoken)
+    got, wanted = said_by_node("hear.mjs", tmp_path / "hearing", spoken, piece), heard(tmp_path / "hearing", spoken)
     assert [phone["label"] for phone in got] == [phone.label for phone in wanted]
     np.testing.assert_allclose([phone["end_s"] for phone in got], [phone.end_s for phone in wanted], atol=1e-9)
     np.testing.assert_allclose([phone["confidence"] for phone in got], [phone.confidence for phone in wanted], atol=1e-3)

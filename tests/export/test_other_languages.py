@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 import pytest
-from pages import EXAMPLES, a_browser, colours, installed, visited
+from pages import EXAMPLES, a_browser, colours, installed, said_by_node, visited
 
 from facesynth.corpus import Corpus, Record
 from facesynth.inference import load
@@ -78,9 +78,7 @@ def test_node_speaks_as_the_runtime_does(talking_head, tmp_path):
 
     model, sound = talking_head
     export_model(model, tmp_path / "lds")
-    command = [shutil.which("node"), "speak.mjs", str(tmp_path / "lds"), str(sound)]
-    done = subprocess.run(command, cwd=installed("node"), check=True, capture_output=True, text=True, timeout=1800)
-    said = json.loads(done.stdout)
+    said = said_by_node("speak.mjs", tmp_path / "lds", sound)
     frames = np.array(said["frames"]).reshape(said["count"], said["channels"])
     assert said["fps"] == FPS
     assert np.abs(frames - expected(tmp_path / "lds", sound)).max() < 1e-2  # mm
@@ -175,9 +173,7 @@ def test_node_takes_the_mean_of_the_channels(lds_file, exported, tmp_path):
 
     sound, folder = tmp_path / "stereo.wav", exported(lds_file)
     sound.write_bytes(wav(channels=2, samples=8000))
-    here = installed("node")
-    command = [shutil.which("node"), "speak.mjs", str(folder), str(sound)]
-    said = json.loads(subprocess.run(command, cwd=here, check=True, capture_output=True, text=True, timeout=1800).stdout)
+    said = said_by_node("speak.mjs", folder, sound)
     stream = load(folder).stream(noise=0.0)
     wanted = np.concatenate([stream.push(read_wav(sound)[0]), stream.finish()])
     assert np.abs(np.array(said["frames"]).reshape(wanted.shape) - wanted).max() < 1e-2  # mm
