@@ -4,6 +4,8 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
+from facesynth.speech.written_forms import one_alphabet
+
 _LATIN = {
     **{"ß": "ss", "ẞ": "SS", "æ": "ae", "Æ": "AE", "œ": "oe", "Œ": "OE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d"},
     **{"Đ": "D", "ð": "th", "Ð": "Th", "þ": "th", "Þ": "Th", "ħ": "h", "Ħ": "H", "ı": "i", "ŋ": "ng", "Ŋ": "NG", "ə": "e"},
@@ -33,11 +35,11 @@ _SPACES_IN_NUMBERS = re.compile(r"(?<=\d)[\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 
 
 def cleaned(text: str) -> str:
-    """Text without soft hyphens, marks of no width and emoji, with one kind of apostrophe and of dash; digits joined."""
+    """Text without soft hyphens, marks of no width and emoji, with one alphabet in each word and one kind of apostrophe and of dash."""
     text = _SPACES_IN_NUMBERS.sub("", text)
     text = re.sub(r"(?<![\d,.])\d{1,3}(?: \d{3}){2,}(?![\d,.])", lambda match: match[0].replace(" ", ""), text)
     kept = "".join(letter for letter in text if unicodedata.category(letter) not in ("Cf", "Cs", "Co") and letter != "\ufe0f")
-    return kept.translate(_APOSTROPHES).translate(_DASHES)
+    return one_alphabet(kept).translate(_APOSTROPHES).translate(_DASHES)
 
 
 def folded(text: str) -> str:

@@ -17,11 +17,32 @@ _SCALES = {"k": "thousand", "m": "million", "mn": "million", "mio": "million", "
 _SCALE = r"\s?(thousand|million|billion|trillion)\b|\s?(k|mn|m|mio|bn|b|tn)\b"
 _COUNTRY = {
     **{"us": "u s", "ca": "canadian", "c": "canadian", "a": "australian", "au": "australian"},
-    **{"hk": "hong kong", "nz": "new zealand"},
+    **{"hk": "hong kong", "nz": "new zealand", "s": "singapore", "sg": "singapore", "nt": "taiwan", "mx": "mexican"},
 }
 _PLURALS = {
-    **{"penny": "pence", "foot": "feet", "inch": "inches"},
-    **{same: same for same in ("yen", "sen", "won", "jeon", "lira", "hertz", "kilohertz", "megahertz", "gigahertz")},
+    **{"foot": "feet", "inch": "inches"},
+    **{"krona": "kronor", "krone": "kroner", "real": "reais", "penny": "pence", "koruna": "korunas"},
+    **{
+        same: same
+        for same in (
+            "yuan",
+            "baht",
+            "rand",
+            "ore",
+            "fen",
+            "xu",
+            "satang",
+            "yen",
+            "sen",
+            "won",
+            "jeon",
+            "lira",
+            "hertz",
+            "kilohertz",
+            "megahertz",
+            "gigahertz",
+        )
+    },
 }
 _MONTHS = (
     *("january", "february", "march", "april", "may", "june"),
@@ -35,8 +56,11 @@ _SIGNS = {"½": "1/2", "⅓": "1/3", "⅔": "2/3", "¼": "1/4", "¾": "3/4", "�
           "⅚": "5/6", "⅐": "1/7", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8", "⅑": "1/9", "⅒": "1/10"}  # fmt: skip
 _LOWERED = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_NUMBERED = "chapter|part|war|act|volume|book|scene|section|phase|type|title|level|stage|bowl|apollo|page|class|figure|table|step"
-_ROMAN = r"(?=[IVXL]{2,}\b|[VX]\b)(XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
+_MEASURES = (
+    "cup|teaspoon|tablespoon|pint|quart|gallon|liter|litre|inch|foot|yard|mile|meter|metre|kilometer|kilometre|pound|ounce|gram|"
+    "kilo|kilogram|dozen|second|minute|hour|day|week|month|year|century|bottle|glass|teaspoonful|spoon|acre|stick|page"
+)
+"""What halves and quarters are taken of."""
 
 
 def _read_table(name: str) -> dict[str, tuple[str, ...]]:
@@ -59,9 +83,11 @@ Rule = tuple[str, Callable[[re.Match[str]], str]]
 
 def numbers_written_out(text: str) -> str:
     """Text with everything that has digits in words; letters that follow digits part from them."""
-    text = _signs_plain(_grouped_as_in_english(text))
+    text = _signs_plain(_grouped_as_in_english(re.sub(r"\bR\$", "BRL", text)))
     for pattern, said in _rules():
         text = re.sub(pattern, lambda match, said=said: f" {said(match)} ", text, flags=re.IGNORECASE)  # type: ignore[misc]
+        text = re.sub(" {2,}", " ", text)
+    text = re.sub(r"(?<=[a-z]) +(?='s\b)", "", text)
     return re.sub(_attributes(), lambda match: f"{match[1]}{_SINGULAR[match[2].lower()]} ", text)
 
 
@@ -104,11 +130,15 @@ def _rules() -> tuple[Rule, ...]:
     symbols = "".join(re.escape(sign) for sign in _MONEY if not sign.isalpha())
     codes = "|".join(code for code in _MONEY if code.isalpha())
     units = "|".join(re.escape(unit) for unit in sorted(_UNITS, key=len, reverse=True))
+    spatial = "|".join(unit for unit in _UNITS if unit[-1] in "²³")
     scale = _SCALE.replace("(", "(?:")
     money = rf"[{symbols}]\s?(?:{_N})(?:{scale})?|(?:{_N})(?:{scale})?\s?(?:[{symbols}]|(?:{codes})\b)"
     year = r"(1\d{3}|2\d{3})"
     return (
         (r"\b(\d{4})-(\d\d)-(\d\d)\b", lambda m: _date(m[3], m[2], m[1])),
+        (r"\b(\d{4})/(\d{1,2})/(\d{1,2})\b", lambda m: _date(m[3], m[2], m[1])),
+        (r"\b(\d{1,2})-(\d{1,2})-(\d{4})\b", lambda m: _slashed(m[1], m[2], m[3])),
+        (r"(?<![\d/])(0?[1-9]|1[0-2])/((?:19|20)\d\d)\b(?!/)", lambda m: f"{_MONTHS[int(m[1]) - 1]} {_year(m[2])}"),
         (r"\b(\d{1,2})/(\d{1,2})/(\d{4}|\d\d)\b", lambda m: _slashed(m[1], m[2], m[3])),
         (r"\b(\d{1,2})\.(\d{1,2})\.(\d{4})\b", lambda m: _date(m[1], m[2], m[3])),
         (rf"\b({_MONTH})\s+(\d{{1,2}})(?:st|nd|rd|th)?(?:,?\s+{year})?\b(?![:.]\d)", lambda m: _named(m[1], m[2], m[3])),
@@ -132,16 +162,17 @@ def _rules() -> tuple[Rule, ...]:
         (rf"(?<![\w)])-(?=[{symbols}]?\.?\d)", lambda m: "minus"),
         (rf"(?:\b([a-z]{{1,2}}))?([{symbols}])\s?({_N})(?:{_SCALE})?", lambda m: _money(m[2], m[3], m[4] or m[5], m[1])),
         (rf"({_N})(?:{_SCALE})?\s?([{symbols}]|(?:{codes})\b)", lambda m: _money(m[4].lower(), m[1], m[2] or m[3], None)),
-        (rf"\b({codes})\s?({_N})(?:{_SCALE})?", lambda m: _money(m[1].lower(), m[2], m[3] or m[4], None)),
+        (rf"\b({codes})\.?\s?({_N})(?:{_SCALE})?", lambda m: _money(m[1].lower(), m[2], m[3] or m[4], None)),
         (r"\b([1-9])\s?'\s?(\d{1,2})(?:\"|''|”)?(?!\w)", lambda m: f"{cardinal(m[1])} foot {cardinal(m[2])}"),
         (r"(?<!\w)'(\d)0s\b", lambda m: _decade(f"{m[1]}0")),
         (r"(?<=\bin )(10[1-9]\d)\b", lambda m: _year(m[1])),
-        (r"\b(1[1-9]\d0|20[1-9]0|[2-9]0)'?s\b", lambda m: _decade(m[1])),
-        (rf"({_N})\s?(mm|cm|km|m|ft|in|mi|yd)([²³])", lambda m: _area(m[1], m[2].lower(), m[3])),
+        (r"\b(1[1-9]\d0|20\d0|[2-9]0)'?s\b", lambda m: _decade(m[1])),
+        (rf"({_N})\s?({spatial})", lambda m: _counted(m[1], _UNITS[m[2].lower()])),
         (r"(\d+|[a-z])(⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda m: f"{m[1]} {_power(m[2].translate(_RAISED))}"),
         (rf"({_N})\s?[-–]\s?(?=\d+\s+\d+/\d|(?:{_N})\s?[%‰°])", lambda m: f"{m[1]} to"),
         (rf"\b(\d+)\s+(\d+)/(\d+)\b(?:\s?({units})(?![\w']))?", lambda m: _mixed(m[1], m[2], m[3], _unit(m[4]))),
         (rf"\b(\d+)/(\d+)\s?(%|(?:{units})(?![\w']))", lambda m: _part_of(m[1], m[2], _unit(m[3]) or m[3])),
+        (rf"(?<!\ba )(?<!\b\d )\b(\d+)/(\d+)\s({_MEASURES})\b", lambda m: _part_of(m[1], m[2], m[3])),
         (rf"({_N})\s?°\s?([cf])?\b", lambda m: _degrees(m[1], m[2])),
         (rf"({_N})\s?°", lambda m: _counted(m[1], "degree")),
         (rf"({_N})\s?%", lambda m: f"{cardinal(m[1])} percent"),
@@ -153,6 +184,7 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b24/7\b", lambda m: "twenty four seven"),
         (r"\b(\d+)/(\d+)\b", lambda m: _fraction(m[1], m[2])),
         (r"\b(\d[\d,]*)(?:st|nd|rd|th)\b", lambda m: ordinal(m[1])),
+        (r"(?<=[a-z])(\d+)s\b", lambda m: _decade(m[1]) if m[1][0] != "0" else m[0]),
         (rf"({_N})\s?({units})(?![\w'])", lambda m: _counted(m[1], _UNITS[m[2].lower()]) if _is_unit(m) else m[0]),
         (r"\b(\d+)\.(\d+)\.(\d+)\b", lambda m: " point ".join(cardinal(part) for part in m.groups())),
         (rf"({_N})(?:x|×|\sx\s)(?=\d)", lambda m: f"{m[1]} by"),
@@ -160,15 +192,6 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b(1[1-9]\d\d|20[1-9]\d)\b(?!,\d)(?!\.\d)", lambda m: _year(m[1])),
         (_N, lambda m: cardinal(m[0])),
     )  # fmt: skip
-
-
-def romans_written_out(text: str) -> str:
-    """`World War II` as two, `Henry VIII` as the eighth."""
-    numbered = rf"\b({_NUMBERED})\s+{_ROMAN}"
-    text = re.sub(numbered, lambda m: f"{m[1]} {cardinal(str(_roman(m[2] + m[3])))}", text, flags=re.IGNORECASE)
-    return re.sub(
-        rf"\b([A-Z][a-z]+)\s+(?=[IVX]{{2}}|[VX]\b){_ROMAN}", lambda m: f"{m[1]} the {ordinal(str(_roman(m[2] + m[3])))}", text
-    )
 
 
 def cardinal(digits: str) -> str:
@@ -194,7 +217,9 @@ def _plural(unit: str, count: str) -> str:
     if float(count.replace(",", "")) == 1:
         return unit
     first, _, rest = unit.partition(" ")
-    if first in ("kilowatt", "watt") and rest == "hour":
+    if first in ("square", "cubic"):
+        return f"{first} {_plural(rest, count)}"
+    if rest == "hour":
         return f"{unit}s"
     return f"{_PLURALS.get(first, first + 's')} {rest}".strip()
 
@@ -206,7 +231,7 @@ def _counted(count: str, unit: str) -> str:
 def _is_unit(match: re.Match[str]) -> bool:
     """`5 s` and `3 h` are measures; capitals such as `4K`, `5G`, `3D` are names."""
     unit = match[2]
-    return not (len(unit) == 1 and unit.isupper() and unit not in ("V", "W", "L"))
+    return not (len(unit) == 1 and unit.isupper() and unit not in ("V", "W", "L", "Ω", "\u2126"))
 
 
 def _money(sign: str, amount: str, scale: str | None, country: str | None) -> str:
@@ -308,12 +333,7 @@ def _year(digits: str) -> str:
 
 def _decade(digits: str) -> str:
     said = _year(digits) if len(digits) == 4 else cardinal(digits)
-    return re.sub("y$", "ies", said) if said.endswith("y") else f"{said}s"
-
-
-def _area(count: str, unit: str, power: str) -> str:
-    long = "inch" if unit == "in" else _UNITS[unit]
-    return f"{cardinal(count)} {'square' if power == '²' else 'cubic'} {_plural(long, count)}"
+    return re.sub("y$", "ies", said) if said.endswith("y") else f"{said}es" if said.endswith("x") else f"{said}s"
 
 
 def _power(exponent: str) -> str:
@@ -341,11 +361,6 @@ def _fraction(top: str, bottom: str, *, inside: bool = False) -> str:
     if over == 1:
         return f"{'a' if inside else 'one'} {part}"
     return f"{cardinal(top)} {'halves' if under == 2 else part + 's'}"
-
-
-def _roman(letters: str) -> int:
-    values = [{"I": 1, "V": 5, "X": 10, "L": 50}[letter] for letter in letters.upper()]
-    return sum(-value if value < following else value for value, following in zip(values, [*values[1:], 0], strict=True))
 
 
 @cache

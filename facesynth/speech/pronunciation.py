@@ -87,15 +87,19 @@ def pronunciations(word: str) -> tuple[Pronunciation, ...]:
     known = _listed(word)
     if known:
         return known
-    stem = re.sub("'s?$", "", word)
-    if stem != word and _listed(stem):
-        return tuple(dict.fromkeys(_with_s(phones) for phones in _listed(stem)))
-    return (sound_out(word),)
+    of_stem = _listed(_stem(word))
+    return tuple(dict.fromkeys(_with_s(phones) for phones in of_stem)) or (sound_out(word),)
 
 
 def is_known(word: str) -> bool:
-    """Whether the dictionary has the word, or the word whose genitive it is."""
-    return bool(_listed(word.lower()) or _listed(re.sub("'s?$", "", word.lower())))
+    """Whether the dictionary has the word, or the word whose genitive or plural it is."""
+    return bool(_listed(word.lower()) or _listed(_stem(word.lower())))
+
+
+def _stem(word: str) -> str:
+    """A word without the ending of a genitive or a plural; empty where it has none."""
+    found = re.fullmatch("(.{2,}[^s'])s|(.*?)'s?", word)
+    return (found[1] or found[2]) if found else ""
 
 
 def _with_s(phones: Pronunciation) -> Pronunciation:

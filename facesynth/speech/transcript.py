@@ -2,10 +2,13 @@
 
 import re
 
+from facesynth.speech.addresses import addresses_written_out, telephones_written_out
 from facesynth.speech.directions import without_directions
 from facesynth.speech.folding import cleaned, folded
-from facesynth.speech.numbers_said import numbers_written_out, romans_written_out
+from facesynth.speech.numbers_said import numbers_written_out
 from facesynth.speech.pronunciation import is_known
+from facesynth.speech.romans_said import romans_written_out
+from facesynth.speech.written_forms import plainly_written
 
 _ABBREVIATIONS = {
     **{"mr": "mister", "mrs": "missus", "ms": "miz", "dr": "doctor", "prof": "professor", "st": "saint", "jr": "junior"},
@@ -18,11 +21,13 @@ _ABBREVIATIONS = {
     **{"pp": "pages", "p": "page", "ch": "chapter", "al": "al", "ph.d": "p h d", "cf": "compare", "tel": "telephone"},
     **{"jan": "january", "feb": "february", "aug": "august", "sept": "september", "oct": "october", "nov": "november"},
     **{"dec": "december", "mon": "monday", "tue": "tuesday", "tues": "tuesday", "thu": "thursday", "thurs": "thursday"},
-    **{"fri": "friday", "a.k.a": "also known as", "asst": "assistant", "bros": "brothers"},
+    **{"fri": "friday", "a.k.a": "also known as", "asst": "assistant", "bros": "brothers", "mme": "madame", "ca": "circa"},
+    **{"c": "circa", "doz": "dozen", "messrs": "messers", "esp": "especially", "ext": "extension", "rt": "route"},
+    **{"rte": "route", "bldg": "building", "feat": "featuring", "incl": "including", "sec": "section"},
 }
-_ONLY_BEFORE_A_NUMBER = frozenset({"no", "nos", "vol", "fig", "p", "pp", "ch"})
+_ONLY_BEFORE_A_NUMBER = frozenset({"no", "nos", "vol", "fig", "p", "pp", "ch", "sec", "ca", "c", "ext", "rt", "rte", "bldg"})
 _ONLY_BEFORE_A_NAME = frozenset({"gen", "col", "rev", "hon", "gov", "sen", "rep", "pres", "mt", "ft", "lt", "st", "mon", "fri"})
-_UNITS = frozenset({"ms", "ft", "min", "p"})
+_UNITS = frozenset({"ms", "ft", "min", "p", "sec"})
 """Measures, where they follow a number."""
 _TITLES = re.compile(r"\b(Mr|Mrs|Ms|Dr|Prof|St|Jr|Sr|Sgt|Capt)(?=\s+[A-Z])")
 _STREET = re.compile(r"(?<=[a-z]\s)(St|Dr)\b\.?(?=\s*(?:[,;.!?]|$|[a-z]|\d))")
@@ -40,12 +45,13 @@ def words_of(text: str) -> tuple[str, ...]:
     """
     plain = without_directions(cleaned(text))[0]
     shouted = plain.upper() == plain
-    plain = _abbreviations_written_out(_addresses_written_out(plain))
+    plain = plainly_written(telephones_written_out(addresses_written_out(plain)))
+    plain = _abbreviations_written_out(plain)
     plain = numbers_written_out(romans_written_out(plain))
     for sign, word in _SIGNS.items():
         plain = plain.replace(sign, f" {word} ")
     plain = folded(plain)
-    tokens = re.findall(r"[A-Za-z]+(?:'[A-Za-z]+)*'?|'[A-Za-z]+", plain)
+    tokens = re.findall(r"[A-Za-z]+(?:'[A-Za-z]+)*(?:(?<=s)')?|'[A-Za-z]+", plain)
     return tuple(word for token in tokens for word in _spelt(token, shouted))
 
 
@@ -54,17 +60,12 @@ def left_out(text: str) -> tuple[str, ...]:
     return without_directions(cleaned(text))[1]
 
 
-def _addresses_written_out(text: str) -> str:
-    text = re.sub(r"(?<=\w)@(?=\w)", " at ", text)
-    return re.sub(r"(?<=\w)\.(com|org|net|edu|gov|io|co|uk|de|fr|eu|ai|tv)\b(?!\.?\w)", r" dot \1 ", text)
-
-
 def _abbreviations_written_out(text: str) -> str:
     def full(match: re.Match[str]) -> str:
         short, following = match[1].lower(), match.string[match.end() :]
         if short in _UNITS and re.search(r"\d\s?$", match.string[: match.start()]):
             return match[0].rstrip(".")
-        if short in _ONLY_BEFORE_A_NUMBER and not re.match(r"\s*[\dIVX]", following):
+        if short in _ONLY_BEFORE_A_NUMBER and not re.match(r"\s*(?:\d|[IVX]{2,}\b|[VX]\b)", following):
             return match[0]
         if short in _ONLY_BEFORE_A_NAME and not re.match(r"\s*[A-Z]", following):
             return match[0]
@@ -73,6 +74,7 @@ def _abbreviations_written_out(text: str) -> str:
     text = _STREET.sub(lambda match: {"St": "street", "Dr": "drive"}[match[1]], text)
     text = _TITLES.sub(lambda match: _ABBREVIATIONS[match[1].lower()], text)
     text = re.sub(r"(?<!\w)w/(?=\s?\w)", "with ", re.sub(r"(?<!\w)w/o\b", "without", text))
+    text = re.sub(r"(?<!\w)vs\b(?!\.)", "versus", text)
     text = re.sub(r"\bN[º°]\s?(?=\d)", "number ", text)
     text = re.sub(r"\b([ap])\.\s?m\.", r"\1m", text, flags=re.IGNORECASE)
     short_forms = "|".join(re.escape(short) for short in sorted(_ABBREVIATIONS, key=len, reverse=True))

@@ -1,6 +1,7 @@
 """Transcripts as people write them: each line of transcripts.txt beside the words that a person says."""
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -100,3 +101,12 @@ def test_a_guessed_encoding_is_told_wherever_words_are_given(tmp_path):
     assert [line for line in report["remarks"]["list.csv"] if told in line]
     _, facts = spoken(talker(tmp_path), sound, tmp_path, "--phones", phones, "--text-file", words)
     assert [line for line in facts["remarks"] if told in line]
+
+
+@pytest.mark.parametrize(
+    "junk", ["a" * 9000, "1-" * 3000, "a@" * 2000, "<" * 3000, "5'" * 2000, "http://" + "a." * 2000, "1/" * 3000]
+)
+def test_long_runs_of_signs_take_no_time_of_their_own(junk):
+    started_s = time.process_time()
+    words_of(junk)
+    assert time.process_time() - started_s < 5
