@@ -35,7 +35,7 @@ _SPACES_IN_NUMBERS = re.compile(r"(?<=\d)[\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 
 
 def cleaned(text: str) -> str:
-    """Text without soft hyphens, marks of no width and emoji, with one alphabet in each word and one kind of apostrophe and of dash."""
+    """Text without marks of no width and emoji, with one alphabet in each word, one kind of apostrophe and of dash."""
     text = _SPACES_IN_NUMBERS.sub("", text)
     text = re.sub(r"(?<![\d,.])\d{1,3}(?: \d{3}){2,}(?![\d,.])", lambda match: match[0].replace(" ", ""), text)
     kept = "".join(letter for letter in text if unicodedata.category(letter) not in ("Cf", "Cs", "Co") and letter != "\ufe0f")

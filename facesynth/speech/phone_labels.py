@@ -12,40 +12,47 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Literal
 
 from facesynth.inference.errors import unknown
 from facesynth.inference.phones import PHONES, SILENCE
+from facesynth.speech.phone_sets import SETS, in_set, set_of
 
-Notation = Literal["arpabet", "ipa", "x_sampa"]
-NOTATIONS: Mapping[Notation, str] = {"arpabet": "ARPAbet", "ipa": "IPA", "x_sampa": "X-SAMPA"}
+Notation = str
+NOTATIONS: Mapping[Notation, str] = {"arpabet": "ARPAbet", "ipa": "IPA", "x_sampa": "X-SAMPA", **SETS}
+"""How labels can be written, by name; a key of this is a notation."""
 
 CLOSURES = {"bcl": "b", "dcl": "d", "gcl": "g", "pcl": "p", "tcl": "t", "kcl": "k"}
 """TIMIT's closures before the release of a stop."""
 
 QUIET = frozenset(
     (
-        *("", "sil", "sp", "ssil", "pause", "silence", "h#", "#h", "epi", "#", "_", "-", "<eps>", "<sil>", "<s>", "</s>"),
         *(
-            "nsn",
-            "noise",
-            "breath",
-            "brth",
-            "cough",
-            "smack",
-            "lau",
-            "uh_noise",
-            "um_noise",
-            "<p:>",
-            "p:",
-            "<p>",
-            "<usb>",
-            "<nib>",
+            "",
+            "sil",
+            "sp",
+            "ssil",
+            "pause",
+            "silence",
+            "silb",
+            "sile",
+            "h#",
+            "#h",
+            "epi",
+            "#",
+            "_",
+            "-",
+            "_:",
+            ",",
+            ".",
+            ";",
+            "!",
         ),
+        *("...", "…", "<eps>", "<sil>", "<s>", "</s>", "<p:>", "p:", "<p>", "<usb>", "<nib>", "nsn", "noise", "vocnoise"),
+        *("breath", "brth", "cough", "smack", "lau", "laugh", "uh_noise", "um_noise"),
     )
 )
 """Silences, pauses and noises."""
-UNCLEAR = frozenset(["spn", "<spn>", "<unk>", "unk", "[unk]", "oov", "<oov>", "+spn+", "<unknown>"])
+UNCLEAR = frozenset(["spn", "<spn>", "<unk>", "unk", "[unk]", "oov", "<oov>", "+spn+", "<unknown>", "unknown", "iver"])
 """Somebody speaks, and the aligner does not know what."""
 
 _QUESTION = re.compile(r"\?{2,}|[*+]+")
@@ -101,7 +108,9 @@ def normalise_phone(label: str, notation: Notation = "arpabet") -> str:
 def notation_of(labels: Iterable[str]) -> Notation:
     """In which notation labels are written: some of them are read in one way alone, others (y, j, N, S) in several."""
     names = {label.strip() for label in labels} - {""}
-    spoken = {name for name in names if not _is_mark(name.lower())}
+    spoken = {name for name in names if not _is_mark(re.sub("_[bies]$", "", name.lower()))}
+    if own := set_of(spoken):
+        return own
     plain = {re.sub(r"[0-9]*(_[BIES])?$", "", name) for name in spoken}
     arpabet = {name for name in plain if name.lower() in _ARPABET_ALONE and (name.islower() or name.isupper())}
     if 3 * len(arpabet) >= len(plain):
@@ -135,32 +144,41 @@ def label_remarks(labels: Iterable[str]) -> tuple[str, ...]:
     return tuple(remarks)
 
 
+def _is_in_angles(plain: str) -> bool:
+    """`<exclude-name>` of Buckeye and its like: somebody speaks."""
+    return len(plain) > 3 and plain[0] == "<" and plain[-1] == ">" and plain[1:-1].strip("-_: ").isprintable()
+
+
 def _is_unclear(plain: str, notation: Notation) -> bool:
-    return plain in UNCLEAR or bool(_QUESTION.fullmatch(plain)) or (plain == "?" and notation != "x_sampa")
+    told = _is_in_angles(plain) and not {plain, plain.strip("<>")} & QUIET
+    return told or plain in UNCLEAR or bool(_QUESTION.fullmatch(plain)) or (plain == "?" and notation != "x_sampa")
 
 
 def _is_mark(plain: str) -> bool:
     """Whether a lower-case label stands for no sound of speech that one knows."""
     marked = len(plain) > 1 and plain[0] in "+[{(" and plain[-1] in "+]})"
-    quiet = plain in QUIET or plain in UNCLEAR or plain == SILENCE
-    return quiet or marked or bool(_QUESTION.fullmatch(plain))
+    quiet = plain in QUIET or plain in UNCLEAR or plain == SILENCE or bool(re.fullmatch(r"#\d*", plain))
+    return quiet or marked or _is_in_angles(plain) or bool(_QUESTION.fullmatch(plain))
 
 
 def _read(label: str, notation: Notation) -> str | None:
-    name = unicodedata.normalize("NFC", label).strip()
+    name = re.sub(r"(?<=\w)_[BIES]$", "", unicodedata.normalize("NFC", label).strip())
     if _is_mark(name.lower()):
         return SILENCE
+    if notation in SETS and (phone := in_set(name, notation)):
+        return phone
     if name.lower().rstrip("0123456789") in _DIGRAPHS:
         return name.lower().rstrip("0123456789")
     readers = {"arpabet": _by_name, "ipa": _in_ipa, "x_sampa": _in_x_sampa}
-    order = [readers[notation], *(reader for other, reader in readers.items() if other != notation)]
+    first = notation if notation in readers else "ipa"
+    order = [readers[first], *(reader for other, reader in readers.items() if other != first)]
     return next((phone for reader in order if (phone := reader(name))), None)
 
 
 def _approximated(label: str, notation: Notation) -> str | None:
     """The phone that stands for a label with a sound that English lacks; None for any other."""
     name = unicodedata.normalize("NFC", label).strip()
-    if _is_mark(name.lower()) or (notation == "arpabet" and _by_name(name)):
+    if _is_mark(name.lower()) or (notation == "arpabet" and _by_name(name)) or (notation in SETS and in_set(name, notation)):
         return None
     text = _ipa_of(name) if notation == "x_sampa" else name
     sounds = _sounds_in(text) if text else None
@@ -170,12 +188,17 @@ def _approximated(label: str, notation: Notation) -> str | None:
 def _by_name(name: str) -> str | None:
     plain = re.sub(r"_[bies]$", "", name.lower())
     plain = re.sub(r"(?<=[a-z])[0-3]$", "", plain)
-    for candidate in (plain, plain.strip("<>()*")):
+    for candidate in (plain, plain.strip("<>()*"), _without_n(plain)):
         if candidate in PHONES:
             return candidate
         if candidate in _OTHER_NAMES:
             return _OTHER_NAMES[candidate]
     return None
+
+
+def _without_n(name: str) -> str:
+    """A vowel that Buckeye marks as nasal: `aan` is aa."""
+    return name[:-1] if len(name) == 3 and name.endswith("n") else name
 
 
 def _in_x_sampa(name: str) -> str | None:
@@ -189,9 +212,7 @@ def _in_ipa(name: str) -> str | None:
         return None
     first, last = sounds[0], sounds[1] if len(sounds) == 3 and sounds[1].vowel else sounds[-1]
     if len(sounds) == 1:
-        syllabic = "\u0329" in unicodedata.normalize("NFD", name) or "\u030d" in name
-        rhotic = "\u02de" in name and first.vowel
-        return "er" if rhotic else _SYLLABIC.get(first.ipa, _nearest(first)) if syllabic else _nearest(first)
+        return _alone(first, unicodedata.normalize("NFD", name))
     if not first.vowel and not last.vowel:
         return _affricate(first, last)
     if first.vowel and (last.vowel or last.ipa in "jwɥɹ"):
@@ -199,6 +220,16 @@ def _in_ipa(name: str) -> str | None:
     if len(sounds) == 3 and _is_obstruent(first) and _is_obstruent(sounds[-1]):
         return None  # a syllable, no phone
     return _nearest(next(sound for sound in sounds if sound.vowel))
+
+
+def _alone(sound: Sound, name: str) -> str:
+    """One sound with its marks: syllabic, coloured by r, or raised as the Czech ř."""
+    if "\u02de" in name and sound.vowel:
+        return "er"
+    if sound.ipa == "r" and re.search("\u031d|\u030c", name):
+        return "zh"
+    syllabic = "\u0329" in name or "\u030d" in name
+    return _SYLLABIC.get(sound.ipa, _nearest(sound)) if syllabic else _nearest(sound)
 
 
 def _is_obstruent(sound: Sound) -> bool:
@@ -283,6 +314,7 @@ def _bare(letter: str) -> str:
 def _ipa_of(name: str) -> str | None:
     """X-SAMPA as IPA; None for anything else."""
     text = re.sub(r"^[\"%']+", "", name)
+    text = re.sub(r"_~|\u035c|\u0361", "", text)
     text = re.sub(r"_[TBHLMRF0-9](?:_[TBHLMRF0-9])*$|[:'~]|:\\", "", text)
     syllabic = bool(re.search(r"(?<=.)_?=$", text))
     text = re.sub(r"(?<=.)_?=$|_[hjwGdnlaAmNocrv+\-/^\"}>{tkxXq?\\0]+", "", text)

@@ -1,6 +1,5 @@
 """Labels of phones that mean nothing here, among others that do: what stands for them, and what is said of it."""
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -40,8 +39,8 @@ def _phone(label: str, notation: Notation) -> str | None:
 
 def _stand_in(label: str, notation: Notation) -> str:
     """A label that means something here; empty, which is silence, where nothing is like it."""
-    letters = re.sub(r"[0-9]+$", "", label.strip())
-    tails = (letters[k:] for k in range(len(letters))) if letters.isalpha() else ()
+    letters = "".join(letter for letter in label if letter.isalpha())
+    tails = (letters[k:] for k in range(len(letters))) if len(letters) >= 0.5 * len(label.strip()) else ()
     return next((tail for tail in tails if _phone(tail, notation) not in (None, SILENCE)), "")
 
 

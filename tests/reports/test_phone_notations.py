@@ -126,9 +126,6 @@ def test_the_table_is_whole():
 @pytest.mark.parametrize(
     ("labels", "strange", "phone"),
     [
-        ("x ian4 m ü3 a1", "ian4", "aa"),
-        ("x uang4 m ü3 a1", "uang4", "aa"),
-        ("n iao3 sh ü3 i1", "iao3", "aw"),
         ("HH XYZ AH0 L OW1", "XYZ", "uh"),
         ("HH 4711 AH0 L OW1", "4711", "pau"),
     ],
@@ -162,3 +159,55 @@ def test_a_tier_of_words_is_no_tier_of_phones(tmp_path):
 def test_digraphs_are_one_sound_among_ipa_too(tmp_path):
     read = read_labelled(put(tmp_path / "a.TextGrid", grid_of(["zh", "ü3", "sh", "a1", "ch", "i4"])[0]))
     assert read.phones.labels[::2] == ("zh", "sh", "ch")
+
+
+SETS = {
+    "pinyin": (
+        "sil b a1 m ian4 f uo3 j iang4 q v2 x iong2 zh uang1 sh uai4 c ui2 l ve4 r en2 ar4 n ü3",
+        "pau b aa m eh f ow jh aa ch uw sh uh zh aa sh ay s ey l eh r ax aa n uw",
+    ),
+    "Japanese": ("silB k o N n i ch i w a my o q py U silE", "pau k ow ng n iy ch iy w aa m ow pau p uw pau"),
+    "Korean": ("k0 aa pp wv s0 vv mm yu c0 xi", "k aa p ah s ah m uw jh iy"),
+    "MRPA": ("pau b @@ d oo n i@ t ou # m ii", "pau b er d ao n ih t ow pau m iy"),
+    "Preston Blair": ("rest MBP AI FV O WQ L etc U E rest", "pau m aa f ow w l s uw eh pau"),
+    "Rhubarb": ("X A D B E F G C H X", "pau m aa s ao uw f eh l pau"),
+}
+
+
+@pytest.mark.parametrize("kind", list(SETS))
+def test_sets_of_one_language_or_program_are_known_by_their_own_labels(tmp_path, kind):
+    labels, phones = SETS[kind]
+    read = read_labelled(put(tmp_path / "a.TextGrid", grid_of(labels.split())[0]))
+    assert read.phones.labels == tuple(phones.split())
+    assert any(line.startswith("the phones are read as") for line in read.remarks)
+
+
+@pytest.mark.parametrize(
+    ("labels", "notation"),
+    [
+        ("a i q t x u", "ipa"), ("uo ie y ö j v a e", "ipa"), ("a4 t i2", "ipa"), ("sh er ch zh ow", "arpabet"),
+        ("sh s t n", "arpabet"), ("m b p pau", "arpabet"), ("N a k S", "x_sampa"), ("A E O @", "x_sampa"), ("B D F G", "arpabet"),
+    ],
+)  # fmt: skip
+def test_labels_that_others_share_are_of_no_such_set(labels, notation):
+    assert notation_of(labels.split()) == notation
+
+
+@pytest.mark.parametrize(
+    ("label", "notation", "phone"),
+    [
+        ("a_~", "x_sampa", "aa"), ("E~_o", "x_sampa", "eh"), ("aan", "arpabet", "aa"), ("own", "arpabet", "ow"), 
+        ("r̝̊", "ipa", "zh"), ("ř", "ipa", "zh"),
+        ("a_E", "ipa", "aa"), ("NSN_S", "arpabet", "pau"), ("<EXCLUDE-name>", "arpabet", "pau"),
+        ("IVER", "arpabet", "pau"), ("silE", "ipa", "pau"), ("_:", "x_sampa", "pau"), (",", "ipa", "pau"), ("#0", "ipa", "pau"),
+    ],
+)  # fmt: skip
+def test_marks_of_corpora_and_aligners(label, notation, phone):
+    assert normalise_phone(label, notation) == phone
+
+
+def test_speech_that_a_corpus_leaves_out_is_told():
+    assert label_remarks(["AA1", "<EXCLUDE-name>", "T"]) == (
+        "what is said at '<EXCLUDE-name>' (1) is not known; the lips rest there",
+    )
+    assert label_remarks(["AA1", "<SIL>", "T"]) == ()
