@@ -3,8 +3,10 @@
 python train/performer_targets.py CORPUS TABLE -o targets.csv
 
 CORPUS shows the lips of a talker, such as GRID s1; TABLE is the table of targets to start from (facesynth/performer/targets.csv).
-Only statistics of the recordings enter: one opening and one dominance for each phone, and how the openings rise and fade for
-all. Every fourth recording is left out and judged. Rows of phones that were not recorded follow their viseme class.
+Only statistics of the recordings enter: one opening and one dominance for each phone, how early and how late phones of a viseme
+class are felt, and how the openings rise and fade for all. Every fourth recording is left out and judged. Rows of phones that
+were not recorded follow their viseme class. Recorded openings are evened out first: small ones of that talker are more than other
+people's (`inference.openings`), and the performer is to be like others, too.
 """
 
 import argparse
@@ -22,6 +24,8 @@ from facesynth.device import device_of
 from facesynth.evaluation.lips import lip_opening
 from facesynth.face.rig.arkit_rig import load_head
 from facesynth.face.rig.markers import MIDDLE_LIPS, LipGap
+from facesynth.inference.lips import bilabial_spans, narrowest_gaps
+from facesynth.inference.openings import Openings
 from facesynth.inference.phones import SILENCE, VISEME_CLASSES, VOWELS
 from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.performer.articulation import FADE, contacts, gestures_of, heard_loudness
@@ -31,10 +35,15 @@ from facesynth.performer.targets import CURVES, SHAPES, Target, read_targets
 
 FPS = 100.0
 EPOCHS, BATCH, RATE = 14, 30, 0.06
-DRAWN_CLASS, DRAWN_PHONE, DRAWN_ERROR = 0.002, 0.008, 0.02
-"""How strongly factors of classes and of phones are drawn to 1; what an error in mm² costs beside 1 - correlation."""
-ROUNDED = 0.5
-"""Share of the table's rounding and spreading that is kept: recorded corners of the mouth move half as far."""
+DRAWN_CLASS, DRAWN_PHONE = (0.02, 0.002), (0.08, 0.008)
+"""How strongly factors of classes and of phones are drawn to 1, those of openings and of dominance: 51 words say little of how
+far a mouth opens at each phone of a language, more of which phones prevail."""
+DRAWN_TIME, DRAWN_ERROR = 0.004, 0.02
+"""The same of how long a class is felt; what an error in mm² costs beside 1 - correlation."""
+EVENED = 0.6
+"""Exponent of a recorded opening between shut and wide."""
+WIDE_PERCENTILE = 95
+"""Of recorded openings: what counts as wide open."""
 LIPS_MOST = 0.6
 """Share of an opening that the lips make at most; the rest is the jaw's."""
 LEAST_MM, MOST_MM, JAW_MOST = 0.2, 16.0, 0.55
@@ -63,27 +72,42 @@ def main() -> None:
     parser.add_argument("table", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--limit", type=int, default=120)
+    parser.add_argument("--rounded", type=float, default=1.0, help="share of rounding and spreading that is kept")
+    parser.add_argument("--wider", type=float, default=1.0, help="factor of the openings: 1 is as the talker")
     parser.add_argument("--device", default="auto", help="auto, cpu, cuda or mps")
     options = parser.parse_args()
     corpus, table = Corpus.open(options.corpus), read_targets(options.table.read_text(encoding="utf-8"))
     with device_of(options.device):
-        clips = [clip_of(corpus[name], list(table)) for name in corpus.ids[: options.limit]]
+        said = [corpus[name] for name in corpus.ids[: options.limit]]
+        openings = openings_of(said)
+        clips = [clip_of(utterance, list(table), openings) for utterance in said]
         clips = [clip for clip in clips if torch.isfinite(clip.seen_mm).all()]
         fit = Fit(table)
         print(f"correlation of openings in {len(clips[::4])} recordings that are left out: {fit.judged(clips[::4]):.3f}")
         fit.learn([clip for number, clip in enumerate(clips) if number % 4])
         print(f"after calibration: {fit.judged(clips[::4]):.3f}")
     print({name: round(value, 4) for name, value in fit.constants().items()})
-    write(options.table, options.output, fit)
+    write(options.table, options.output, fit, options.rounded, options.wider)
 
 
-def clip_of(utterance: Utterance, phones: list[str]) -> Clip:
+def openings_of(said: list[Utterance]) -> Openings:
+    """How a talker's openings are evened out: from his p, b and m to what one frame in twenty exceeds."""
+    shut = [
+        narrowest
+        for u in said
+        for narrowest in narrowest_gaps(u.motion.frames, u.motion.layout, bilabial_spans(u.speech.phones, u.motion.fps))
+    ]
+    wide = np.nanpercentile(np.concatenate([lip_opening(u.motion) for u in said]), WIDE_PERCENTILE)
+    return Openings(EVENED, float(np.nanmedian(shut)), float(wide))
+
+
+def clip_of(utterance: Utterance, phones: list[str], openings: Openings) -> Clip:
     speech = utterance.speech
     count = int(speech.phones.frame_bounds(FPS)[-1])
     times = np.arange(count) / FPS
     cues = listen(speech, np.zeros(1), count, FPS)
     gestures = gestures_of(speech.phones)
-    seen = lip_opening(utterance.motion)
+    seen = openings.changed(lip_opening(utterance.motion))
     bounds = speech.phones.frame_bounds(FPS)
     spoken = [k for k, label in enumerate(speech.phones.labels) if label != SILENCE]
     return Clip(
@@ -110,12 +134,17 @@ class Fit(torch.nn.Module):
         self.vowel = torch.tensor([phone in VOWELS for phone in self.phones])
         self.kind = torch.tensor([next(k for k, one in enumerate(VISEME_CLASSES) if phone in one) for phone in self.phones])
         self.of_class, self.of_phone = (torch.nn.Parameter(torch.zeros(2, n)) for n in (count, len(self.phones)))
+        self.felt = torch.nn.Parameter(torch.zeros(2, count))
         self.shared = torch.nn.Parameter(torch.zeros(len(FADE)))
         self.line = torch.nn.Parameter(torch.tensor([0.0, 1.0]))
 
     def factors(self) -> Tensor:
         """[2, P] of openings and of dominance."""
         return torch.exp(self.of_class[:, self.kind] + self.of_phone)
+
+    def times(self) -> Tensor:
+        """[2, P] factors of how early and how late each phone is felt."""
+        return torch.exp(self.felt[:, self.kind])
 
     def constants(self) -> dict[str, float]:
         """What the constants of `FADE` are to be."""
@@ -135,8 +164,9 @@ class Fit(torch.nn.Module):
         target = self.start_mm[clip.phone] * opening * torch.where(self.vowel[clip.phone], reached, 1.0)
         times = torch.arange(len(clip.seen_mm))[:, None] / FPS
         away = ((times - middle).abs() - fade["held"] * length).clamp(min=0)
-        before = self.early[clip.phone] * (fade["before_s"] + fade["before"] * short)
-        after = self.late[clip.phone] * (fade["after_s"] + fade["after"] * short)
+        earlier, later = (row[clip.phone] for row in self.times())
+        before = earlier * self.early[clip.phone] * (fade["before_s"] + fade["before"] * short)
+        after = later * self.late[clip.phone] * (fade["after_s"] + fade["after"] * short)
         felt = torch.exp(-((away / torch.where(times < middle, before, after) + 1e-6) ** 1.25))
         weights = self.claim[clip.phone] * dominance * felt
         blend = (weights * target).sum(dim=1) / (weights.sum(dim=1) + 1e-6)
@@ -166,7 +196,8 @@ class Fit(torch.nn.Module):
 
     def drawn(self) -> Tensor:
         """What factors cost that are not 1."""
-        return DRAWN_CLASS * self.of_class.square().sum() + DRAWN_PHONE * self.of_phone.square().sum()
+        by_class, by_phone = (factors.square().sum(dim=1) for factors in (self.of_class, self.of_phone))
+        return _tensor(DRAWN_CLASS) @ by_class + _tensor(DRAWN_PHONE) @ by_phone + DRAWN_TIME * self.felt.square().sum()
 
     @torch.no_grad()
     def judged(self, clips: list[Clip]) -> float:
@@ -186,11 +217,11 @@ def lip_slopes_mm() -> np.ndarray:
     return np.array([sum(share * slopes[ARKIT_NAMES.index(name)] for name, share in one.items()) for one in names])
 
 
-def calibrated(target: Target, opening_mm: float, dominance: float) -> Target:
+def calibrated(target: Target, opening_mm: float, dominance: float, rounded: float) -> Target:
     """A target that opens so far: by the lips up to LIPS_MOST of it, by the jaw for the rest, but at sibilants."""
     slopes, pose = lip_slopes_mm(), target.pose.copy()
     jaw, lips = CURVES.index("jaw_open"), [CURVES.index(name) for name in ("lower_down", "upper_up")]
-    pose[[CURVES.index(name) for name in ("pucker", "funnel", "stretch", "smile")]] *= ROUNDED
+    pose[[CURVES.index(name) for name in ("pucker", "funnel", "stretch", "smile")]] *= rounded
     by_lips = float(pose[lips] @ slopes[lips])
     pose[lips] *= min(1.0, LIPS_MOST * opening_mm / by_lips) if by_lips > 0 else 1.0
     others = float(pose @ slopes) - pose[jaw] * slopes[jaw]
@@ -202,20 +233,22 @@ def calibrated(target: Target, opening_mm: float, dominance: float) -> Target:
     return replace(target, pose=pose, dominance=claims)
 
 
-def write(table: Path, output: Path, fit: Fit) -> None:
+def write(table: Path, output: Path, fit: Fit, rounded: float, wider: float) -> None:
     """The table with the openings and dominances of a fit; contacts and rests stay as they are."""
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     known = read_targets(table.read_text(encoding="utf-8"))
     opening, dominance = fit.factors().detach().cpu().numpy()
+    early, late = fit.times().detach().cpu().numpy()
     for number, row in enumerate(rows):
         if row["closes"] in ("lips", "rest"):
             continue
         like = fit.phones.index(LIKE.get(row["phone"], row["phone"]))
-        opening_mm = min(float(fit.start_mm[number] * opening[like]), MOST_MM)
-        made = calibrated(known[row["phone"]], opening_mm, float(dominance[like]))
+        opening_mm = min(float(wider * fit.start_mm[number] * opening[like]), MOST_MM)
+        made = calibrated(known[row["phone"]], opening_mm, float(dominance[like]), rounded)
         row |= {name: f"{value:.3g}" for name, value in zip(CURVES, made.pose, strict=True)}
         for who, name in (("jaw", "jaw_open"), ("opening", "lower_down")):
             row[f"{who}_dominance"] = f"{made.dominance[CURVES.index(name)]:.3g}"
+        row |= {"early": f"{made.early * early[like]:.3g}", "late": f"{made.late * late[like]:.3g}"}
     with output.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()

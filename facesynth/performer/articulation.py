@@ -27,14 +27,14 @@ PAUSE_S = 0.22
 FLOOR = 1e-6
 """Dominance of the rest pose where nothing else is claimed."""
 FADE: Mapping[str, float] = {
-    "long": 0.127,
-    "loud": 0.727,
-    "held": 0.076,
-    "before_s": 0.0388,
-    "before": 0.141,
-    "after_s": 0.0327,
-    "after": 0.0691,
-    "smooth_s": 0.0228,
+    "long": 0.0826,
+    "loud": 0.4458,
+    "held": 0.0306,
+    "before_s": 0.0396,
+    "before": 0.1086,
+    "after_s": 0.0307,
+    "after": 0.0657,
+    "smooth_s": 0.0379,
 }
 """How openings rise and fade, calibrated on a recorded talker by train/performer_targets.py: exponents of a vowel's length and
 loudness; the share of a phone to either side of its middle over which it is felt in full; time constants before and after it,

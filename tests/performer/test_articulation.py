@@ -81,7 +81,7 @@ def test_preparing_reaches_further_than_lingering():
 def test_fast_vowels_undershoot():
     slow = mean_over_tokens("t aa t", 2, "jaw_open", phone_s=0.15)
     fast = mean_over_tokens("t aa t", 2, "jaw_open", phone_s=0.05)
-    assert fast < 0.85 * slow
+    assert fast < 0.9 * slow
 
 
 def test_weak_vowels_undershoot():
@@ -92,16 +92,16 @@ def test_weak_vowels_undershoot():
 
 
 def test_s_decides_about_the_jaw_and_h_does_not():
-    assert mean_over_tokens("aa s aa", 2, "jaw_open") < 0.15
-    assert mean_over_tokens("aa hh aa", 2, "jaw_open") > 0.25
-    assert mean_over_tokens("iy hh iy", 2, "jaw_open") < 0.2
+    assert mean_over_tokens("aa s aa", 2, "jaw_open") < 0.2
+    assert mean_over_tokens("aa hh aa", 2, "jaw_open") > 0.3
+    assert mean_over_tokens("iy hh iy", 2, "jaw_open") < 0.25
 
 
 def test_diphthongs_glide():
     phones = phone_track("t ay t", phone_s=0.2)
     jaw = curve(articulated(phones), "jaw_open")
     start, end = round(phones.starts_s[2] * FPS), round(phones.ends_s[2] * FPS)
-    assert jaw[start + 6 : start + 14].mean() > 1.5 * jaw[end - 6 : end].mean()
+    assert jaw[start + 6 : start + 14].mean() > 1.2 * jaw[end - 6 : end].mean()
 
 
 def test_the_mouth_shuts_in_long_silences_only():
