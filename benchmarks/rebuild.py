@@ -3,7 +3,8 @@
 Words of a command that are given here are replaced by what they stand for, as by `benchmarks/cards.py`; a model whose recordings
 are not here is told and left out. Each model is made in an empty folder and compared with the packaged one, file by file: the
 same bytes, or which differ. A manifest counts as the same where nothing but versions of packages differs, and what hashes them.
-The exit status is 1 where a file differs. With `--keep FOLDER` what was made stays there.
+Training takes one thread, since sums of several are rounded as they come. The exit status is 1 where a file differs. With
+`--keep FOLDER` what was made stays there.
 """
 
 import argparse
@@ -54,9 +55,10 @@ def same(folder: Path, places: Mapping[str, str], place: Path) -> bool:
 
 
 def run(words: list[str], place: Path) -> None:
-    """A command of this repository, in a folder."""
+    """A command of this repository, in a folder, on one thread."""
     program = [str(ROOT / words[1]), *words[2:]] if words[0] == "python" else ["-m", *words]
-    subprocess.run([sys.executable, *program], cwd=place, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    own = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    subprocess.run([sys.executable, *program], cwd=place, check=True, env=own)
 
 
 def alike(made: Path, packaged: Path) -> bool:

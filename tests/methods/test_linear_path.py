@@ -74,6 +74,13 @@ def test_each_emotion_has_poses_of_its_own():
     np.testing.assert_allclose(found[inside], some[0].poses[inside], atol=0.15)
 
 
+def test_a_corpus_that_could_hold_other_emotions_and_recorded_one_is_of_one():
+    reading, said = replace(READING, emotion_count=4), Said.numbered([0], np.array([np.inf]), [0], 4)
+    path = LinearPath()
+    path.learn([replace(recording(np.ones((BANDS, 1), np.float32), 0), said=said) for _ in range(4)], reading, 3)
+    assert not len(path.emotions)
+
+
 def test_it_counts_half_where_there_are_several_emotions():
     calm, moved = LinearPath(), LinearPath()
     calm.learn([recording(np.ones((BANDS, 1), np.float32), 0)], READING, 3)

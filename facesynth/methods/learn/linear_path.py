@@ -20,7 +20,7 @@ from facesynth.methods.learn.windows import Recording
 SHARE = 0.4
 """How much of the pose is the regression's; the network's is the rest."""
 AMONG_EMOTIONS = 0.5
-"""What that is multiplied by where there are several emotions: they change how a sound is said, which it cannot know."""
+"""What that is multiplied by where several emotions were recorded: they change how a sound is said, which it cannot know."""
 SIDE = 5
 """Frames of the sound on either side of a frame that are heard, as far as may be looked ahead."""
 PENALTIES = 10.0 ** np.arange(-3, 2.1, 0.5)
@@ -37,7 +37,7 @@ class LinearPath(nn.Module):
     bias: Tensor
     """[R]"""
     emotions: Tensor
-    """[E, R] where the poses of each emotion lie, which a sound tells a regression little of; none where there is one emotion."""
+    """[E, R] where the poses of each emotion lie, which a sound tells a regression little of; none where one was recorded."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -104,8 +104,9 @@ def _samples(
 
 
 def _by_emotion(recordings: Sequence[Recording], reading: Reading) -> NDArray[np.float64]:
-    """[E, R] by least squares from how much of each emotion is felt; [0, R] where the model knows one alone."""
-    count = reading.emotion_count if reading.emotion_count > 1 else 0
+    """[E, R] by least squares from how much of each emotion is felt; [0, R] where one alone was recorded."""
+    felt_at_all = {int(one) for recording in recordings for one in np.flatnonzero(recording.said.emotions.any(axis=0))}
+    count = reading.emotion_count if len(felt_at_all) > 1 else 0
     squares, products = np.eye(count) * 1e-6, np.zeros((count, recordings[0].poses.shape[1]))
     for recording in recordings if count else ():
         present = recording.present > 0
