@@ -1,6 +1,6 @@
 """Near and lively: searches and the network beside each other on the same clips of one talker, each as lively as the other.
 
-python benchmarks/frontier.py CORPUS -o FOLDER [--fold 1] [--clips 50] [--variant both] [--device cuda] [--join]
+python benchmarks/frontier.py CORPUS -o FOLDER [--fold 1] [--clips 50] [--variant both] [--rows lds tcn] [--device cuda] [--join]
 
 Each of five folds tests a fifth of the sentences. Of the others a fifth says how much lips must be sharpened to move as recorded
 (and which variant of `network_variants.py` is taken, of those that FOLDER holds for the fold), by models that learned from the
@@ -23,11 +23,11 @@ from frontier_table import Judge, Motions, join
 from network_variants import VARIANTS, inner, kept, parts
 
 from facesynth.config import load_config
-from facesynth.corpus import Corpus
+from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.same_words import said_words, same_words
 from facesynth.inference.filters import sharpen
 from facesynth.inference.motion import Motion
-from facesynth.inference.residual import ResidualMotion, main_emotion
+from facesynth.inference.residual import ResidualMotion, loudness, main_emotion
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.learn.point_loss import lip_points
@@ -39,7 +39,7 @@ from facesynth.methods.registry import create
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 AS_IT_COMES = {"learn": False, "sharpening": 0.0}
-REFERENCES = ("efase", "viseme_table", "mean_face", "ridge", "coarticulation", "tcn")
+REFERENCES = ("mean_face", "viseme_table", "phone_mean", "coarticulation", "ridge", "efase", "lds", "anime_graph", "tcn")
 
 
 def main() -> None:
@@ -49,6 +49,8 @@ def main() -> None:
     parser.add_argument("--fold", type=int, help="1 to 5; all unless given")
     parser.add_argument("--clips", type=int, help="how many to learn from; all unless given")
     parser.add_argument("--variant", choices=list(VARIANTS), help="of the network; the best that the folder holds unless given")
+    parser.add_argument("--rows", nargs="+", metavar="ROW", help="only these, a search with its sharpened rows; all unless given")
+    parser.add_argument("--plain", action="store_true", help="network and searches as they come alone, not sharpened")
     parser.add_argument("--device", default="cpu", help="where networks learn")
     parser.add_argument("--join", action="store_true", help="only print the tables of what is there")
     options = parser.parse_args()
@@ -74,42 +76,48 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
     def network(some: Corpus, name: str) -> Network:
         return kept(options.output / f"{stem}_{name}.safetensors", some, VARIANTS[variant], 0, options.device)
 
-    first, whole = network(learned, "0"), network(rest, "whole")
+    whole = network(rest, "whole")
     judge = Judge(rest, tested, whole.facts["closed_gap"], options.output / f"figures_{len(rest)}_{fold}.npz")
-    residual = Residual()
-    residual.learn(rest)
-    beside = residual.motion(corpus.fps, 1.0)
-    assert beside is not None
     makers = {
         "network": lambda net, _: net,
         "eFASE soft": soft_efase,
         "its search alone": search_alone,
         "anime graph soft": soft_graph,
     }
-    for name, make in list(makers.items())[: 2 if options.clips else None]:
-        if f"{name}, lips sharpened, residual" in judge.rows:
-            continue
-        shares = shares_of(make(first, learned), held_out)
-        plain = spoken(make(whole, rest), tested)
-        for row, motions in {
-            name: plain,
-            f"{name}, sharpened": lively(plain, tested, shares[1]),
-            f"{name}, lips sharpened, residual": lively(plain, tested, shares[0], beside),
-        }.items():
-            judge.add(row, motions)
-            print(f"{perf_counter() - began:.0f} s, {fold}: {row} {judge.line(row)} (shares {shares})", flush=True)
-    if not options.clips:
-        for row, speak in references(rest, tested, options.device).items():
-            if row in judge.rows:
-                continue
+    others = {} if options.clips else references(rest, tested, options.device)
+    for row, speak in others.items():
+        if row not in judge.rows and row in (options.rows or others):
             judge.add(row, speak())
             print(f"{perf_counter() - began:.0f} s, {fold}: {row} {judge.line(row)}", flush=True)
+    for name, make in list(makers.items())[: 2 if options.clips else None]:
+        last = name if options.plain else f"{name}, lips sharpened, residual"
+        if last in judge.rows or name not in (options.rows or makers):
+            continue
+        plain = spoken(make(whole, rest), tested)
+        found = {name: plain}
+        if not options.plain:
+            shares = shares_of(make(network(learned, "0"), learned), held_out)
+            found[f"{name}, sharpened"] = lively(plain, tested, shares[1])
+            found[last] = lively(plain, tested, shares[0], beside_lips(rest))
+            print(f"{fold}: {name}: sharpened by {shares}")
+        for row, motions in found.items():
+            judge.add(row, motions)
+            print(f"{perf_counter() - began:.0f} s, {fold}: {row} {judge.line(row)}", flush=True)
+
+
+def beside_lips(learned: Corpus) -> ResidualMotion:
+    """What moves beside the lips, as recorded."""
+    residual = Residual()
+    residual.learn(learned)
+    motion = residual.motion(learned.fps, 1.0)
+    assert motion is not None
+    return motion
 
 
 def best_variant(folder: Path, fold: int) -> str:
     """Of the variants in a folder the one of least lip error on the clips that a fold chooses by."""
     found = [json.loads(path.read_text()) for path in sorted(folder.glob(f"{fold}_*_0.json"))]
-    found = [each for each in found if " ms" not in each["variant"] and each["variant"] != "sound"]
+    found = [each for each in found if " ms" not in each["variant"] and "sound" not in each["variant"] and not each["steps"]]
     return min(found, key=lambda each: each["lve"])["variant"] if found else "both"
 
 
@@ -171,7 +179,22 @@ def references(learned: Corpus, tested: Corpus, device: str) -> dict[str, Callab
         return spoken(model.to(device if name == "tcn" else "cpu").fit(learned).to("cpu"), tested)
 
     recorded = {u.id: u.motion for u in tested}
-    return {"recorded": lambda: recorded, "same word again": again} | {name: partial(of, name) for name in REFERENCES}
+    own = {"recorded": lambda: recorded, "same word again": again, "loudness": partial(by_loudness, learned, tested)}
+    return own | {name: partial(of, name) for name in REFERENCES}
+
+
+def by_loudness(learned: Corpus, tested: Corpus) -> Motions:
+    """Poses along one line, as far as the sound is loud: what a jaw does that follows the level alone."""
+    pairs = [(loudness(u.speech, u.motion.fps, len(u.motion)), u.motion.frames) for u in learned]
+    heard, moved = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+    there = np.isfinite(moved).all(axis=1)
+    line = np.linalg.lstsq(np.c_[heard, np.ones(len(heard))][there], moved[there], rcond=None)[0]
+
+    def pose(u: Utterance) -> Motion:
+        level = loudness(u.speech, learned.fps, len(u.motion))
+        return Motion((np.c_[level, np.ones(len(level))] @ line).astype(np.float32), learned.fps, learned.layout)
+
+    return {u.id: pose(u) for u in tested}
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from facesynth.methods.learn.point_loss import lip_points
 
 Motions = dict[str, Motion]
 FIGURES = ("`lve`", "energy", "of the lips", "closure", "false", "closed: `lve`", "closure", "false", "in step", "told apart")
-BEST, AS_LIVELY = "eFASE soft, lips sharpened, residual", "network, sharpened"
+BEST = "eFASE soft, lips sharpened, residual"
 
 
 class Judge:
@@ -64,15 +64,21 @@ def join(folder: Path) -> None:
 
 
 def compared(rows: dict[str, np.ndarray]) -> None:
-    """Which rows are farther off than the best search, clip by clip, Holm over all of them."""
-    if BEST not in rows:
-        return
+    """The best search against every other row, clip by clip, Holm over all of them: lip error, and telling lips from recorded."""
     others = [name for name in rows if name not in (BEST, "recorded")]
-    apart = {name: rows[name][:, 0] - rows[BEST][:, 0] for name in others}
-    chances = holm([float(wilcoxon(apart[name]).pvalue) for name in others])
-    print(f"\n{BEST} is nearer than")
-    for name, chance in zip(others, chances, strict=True):
-        print(f"- {name}: by {apart[name].mean():.3f} mm, in {(apart[name] > 0).sum()} clips, p = {chance:.2g}")
+    for what, column in (("lip error, mm", "`lve`"), ("told from recorded lips", "told apart")) if BEST in rows else ():
+        k = FIGURES.index(column)
+        apart = {name: differences(rows[name][:, k] - rows[BEST][:, k]) for name in others}
+        apart = {name: each for name, each in apart.items() if len(each)}
+        chances = holm([float(wilcoxon(each).pvalue) for each in apart.values()])
+        print(f"\n{what}, beside that of {BEST}: more by")
+        for (name, each), chance in zip(apart.items(), chances, strict=True):
+            print(f"- {name}: {each.mean():.3f}, in {(each > 0).sum()} of {len(each)} clips, p = {chance:.2g}")
+
+
+def differences(each: np.ndarray) -> np.ndarray:
+    """Those that can be told."""
+    return each[np.isfinite(each)]
 
 
 def cells(lines: np.ndarray) -> str:

@@ -1,6 +1,6 @@
 """What makes the network of poses better on clips that it never saw: one change at a time, and some together.
 
-python benchmarks/network_variants.py CORPUS -o FOLDER [--fold 1] [--device cuda] [--variants base largest …]
+python benchmarks/network_variants.py CORPUS -o FOLDER [--fold 1] [--device cuda] [--steps 350] [--variants both bands …]
 
 Of the clips that a fold learns from a fifth is kept out; the rest is learned from, and the lip error of the clips kept out says
 which variant is best. The tested clips play no part. Each network stays in FOLDER, and is not learned again.
@@ -66,7 +66,9 @@ VARIANTS = {
 }
 LOOK_AHEAD_MS = (0, 40, 80, 160, 320)
 VARIANTS |= {f"{ms} ms": Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
-VARIANTS |= {f"sound {ms} ms": Variant({"phones": False, "look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
+BY_EAR = BANDS | Variant({"phones": False})
+VARIANTS |= {"sound, bands": BY_EAR}
+VARIANTS |= {f"sound {ms} ms": BY_EAR | Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
 
 
 def main() -> None:
@@ -76,17 +78,21 @@ def main() -> None:
     parser.add_argument("--fold", type=int, default=1)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--steps", type=int, help="of the training, for all variants; their own unless given")
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), metavar="NAME")
     options = parser.parse_args()
     rest, _ = parts(Corpus.open(options.corpus), options.fold)
     learned, held_out = inner(rest, options.fold)
     print(f"fold {options.fold}: {len(learned)} clips to learn from, {len(held_out)} to choose by", flush=True)
+    shorter = Variant({"steps": options.steps} if options.steps else {})
     for name in options.variants:
         began = perf_counter()
-        path = options.output / f"{options.fold}_{name.replace(' ', '_')}_{options.seed}.safetensors"
-        network = kept(path, learned, VARIANTS[name], options.seed, options.device)
+        stem = f"{options.fold}_{name.replace(' ', '_')}" + (f"_{options.steps}steps" if options.steps else "")
+        path = options.output / f"{stem}_{options.seed}.safetensors"
+        network = kept(path, learned, VARIANTS[name] | shorter, options.seed, options.device)
         lips, energy = judged(network, held_out)
-        path.with_suffix(".json").write_text(json.dumps({"fold": options.fold, "variant": name, "lve": lips, "energy": energy}))
+        found = {"fold": options.fold, "variant": name, "steps": options.steps, "lve": lips, "energy": energy}
+        path.with_suffix(".json").write_text(json.dumps(found))
         print(f"| {options.fold} | {name} | {lips:.3f} | {energy:.2f} | {perf_counter() - began:.0f} s |", flush=True)
 
 
