@@ -135,6 +135,7 @@ def main() -> None:
     parser.add_argument("--rows", nargs="+", metavar="ROW", help="all unless given")
     parser.add_argument("--own", type=int, default=40, help="unseen clips of the talker that are said")
     parser.add_argument("--voices", type=int, default=20, help="sounds of the recordings, taken evenly")
+    parser.add_argument("--errors", type=Path, metavar="FILE", help="where lines `row,clip,lip error` are added")
     parser.add_argument("--device", default="cpu")
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -150,7 +151,11 @@ def main() -> None:
         for name in options.rows or makers:
             began = process_time()
             model = makers[name]()
-            error = np.nanmean([lip_error(model, u) for u in own])
+            errors = [lip_error(model, u) for u in own]
+            if options.errors:
+                with options.errors.open("a", encoding="utf-8") as file:
+                    file.writelines(f'"{name}",{u.id},{error:.5f}\n' for u, error in zip(own, errors, strict=True))
+            error = np.nanmean(errors)
             figures = (*followed(model, said, heard), *shuts(model, voices, shut))
             print(f"| {name} | {error:.3f} | {' | '.join(f'{figure:.3f}' for figure in figures)} |", flush=True)
             print(f"{name}: {process_time() - began:.0f} s of processor time", file=sys.stderr, flush=True)

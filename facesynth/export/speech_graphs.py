@@ -71,7 +71,7 @@ def rasta_plp_stream_graph(plp: RastaPlp) -> Graph:
         frames = torch.from_numpy(arrays["windows"]).double()
         power = torch.fft.rfft(frames * plp.window, plp.fft).abs() ** 2 + ROUNDING_POWER * plp.window.square().sum()
         energies = (power @ plp.bands).log()
-        filtered = plp.filter_along_time(energies) if arrays["fresh"] else _continued(plp, energies, arrays)
+        filtered = plp.filter_along_time(energies)[0] if arrays["fresh"] else _continued(plp, energies, arrays)
         cepstra = plp.cepstra(torch.exp((filtered + plp.loudness.log()) / 3))
         return [cepstra.float().numpy(), energies[:, -4:].numpy(), filtered[:, -1].numpy()]
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats
-from .long_arrays import by_columns, by_overlapping_blocks
+from .arrays import Floats, Ints
+from .long_arrays import Growing, by_columns, by_overlapping_blocks, let_go, row_blocks, zeros
 
 PASS, ORDER = 0.9, 6
 """Movement up to this share of the new rate's Nyquist frequency is kept when a rate falls, by a Butterworth filter."""
@@ -72,32 +72,55 @@ def forth_and_back(sections: Floats, signal: Floats, reach: ArrayLike) -> Floats
     head = np.where(own > 0, 2 * signal[0] - np.take_along_axis(signal, np.minimum(before, count - 1), axis=0), signal[0])
     behind = count - 1 - np.clip(np.arange(1, most + 1)[:, None], 1, np.maximum(own, 1))
     tail = np.where(own > 0, 2 * signal[-1] - np.take_along_axis(signal, np.maximum(behind, 0), axis=0), signal[-1])
-    extended = np.concatenate([head[:most], signal, tail[:most]])
-    there = _run(sections, extended)
-    last = most + count + own - 1
-    end = there[last, np.arange(channels)]
-    held = np.where(np.arange(len(there))[:, None] > last, end, there)
-    return _run(sections, held[::-1])[::-1][most : most + count]
+    run, there = _Cascade(sections), Growing(np.float64)
+    for piece in (head[:most], *(signal[rows] for rows in row_blocks(signal)), tail[:most]):
+        there.add(run.on(piece))
+    return _back(sections, there.whole(), own)[most : most + count]
 
 
-def _run(sections: Floats, signal: Floats) -> Floats:
-    """The cascade over [T, C], started in the steady state of the first frame."""
-    shape = (len(sections), signal.shape[1])
-    g, a1, a2 = (np.broadcast_to(sections[:, k].reshape(len(sections), -1), shape) for k in range(3))
-    first = np.broadcast_to(signal[0], shape)
-    s0, s1 = (1 - g) * first, (g - a2) * first
-    out, rows = np.empty_like(signal), list(zip(g, a1, a2, strict=True))
-    s0, s1 = list(s0), list(s1)
-    for t, x in enumerate(signal):
-        value = x
-        for k, (gain, b1, b2) in enumerate(rows):
-            scaled = gain * value
-            y = scaled + s0[k]
-            s0[k] = 2 * scaled - b1 * y + s1[k]
-            s1[k] = scaled - b2 * y
-            value = y
-        out[t] = value
+def _back(sections: Floats, there: Floats, own: Ints) -> Floats:
+    """What ran forth [most + T + most, C] runs back, each channel from where its own continuation [C] ends."""
+    last = len(there) - int(own.max()) + own - 1
+    end = there[last, np.arange(there.shape[1])]
+    run, out = _Cascade(sections), zeros(there.shape)
+    for rows in reversed([*row_blocks(there)]):
+        held = np.where(np.arange(rows.start, rows.stop)[:, None] > last, end, there[rows])
+        out[rows] = run.on(held[::-1])[::-1]
+        let_go(there)
+        let_go(out)
     return out
+
+
+class _Cascade:
+    """The sections one after the other, over a signal that comes in pieces [n, C], started in the steady state of the first frame."""
+
+    def __init__(self, sections: Floats) -> None:
+        self._sections = sections
+        self._rows: list[tuple[Floats, Floats, Floats]] = []
+        self._s0: list[Floats] = []
+        self._s1: list[Floats] = []
+
+    def _start(self, first: Floats) -> None:
+        shape = (len(self._sections), len(first))
+        g, a1, a2 = (np.broadcast_to(self._sections[:, k].reshape(len(self._sections), -1), shape) for k in range(3))
+        self._rows = list(zip(g, a1, a2, strict=True))
+        self._s0, self._s1 = list((1 - g) * first), list((g - a2) * first)
+
+    def on(self, signal: Floats) -> Floats:
+        """The next frames."""
+        if len(signal) and not self._rows:
+            self._start(signal[0])
+        out, s0, s1 = np.empty_like(signal), self._s0, self._s1
+        for t, x in enumerate(signal):
+            value = x
+            for k, (gain, b1, b2) in enumerate(self._rows):
+                scaled = gain * value
+                y = scaled + s0[k]
+                s0[k] = 2 * scaled - b1 * y + s1[k]
+                s1[k] = scaled - b2 * y
+                value = y
+            out[t] = value
+        return out
 
 
 def spline_at(signal: Floats, at: Floats) -> Floats:

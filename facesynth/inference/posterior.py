@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Floats
+from .ragged import Made, Ragged
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,9 +19,10 @@ class Posterior:
     forward: Sequence[Floats]
     backward: Sequence[Floats]
 
-    def shares(self) -> list[Floats]:
+    def shares(self) -> Sequence[Floats]:
         """T of [n_t] probabilities."""
-        return [np.exp(a + b - log_sum(a + b, 0)) for a, b in zip(self.forward, self.backward, strict=True)]
+        both = (a + b for a, b in zip(self.forward, self.backward, strict=True))
+        return Ragged(np.float64, (np.exp(score - log_sum(score, 0)) for score in both))
 
     def of_steps(self, t: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> Floats:
         """[n] probabilities of the steps from states `row` at t to states `column` at t + 1."""
@@ -30,12 +32,17 @@ class Posterior:
 
 def posterior(scores: Sequence[Floats], moves: Sequence[Floats]) -> Posterior:
     """scores T of [n_t], moves T - 1 of [n_t, n_t+1]; -cost / temperature each."""
-    forward, backward = [scores[0]], [np.zeros(len(scores[-1]))]
-    for move, score in zip(moves, scores[1:], strict=True):
-        forward.append(log_sum(forward[-1][:, None] + move, 0) + score)
-    for move, score in zip(moves[::-1], scores[:0:-1], strict=True):
-        backward.append(log_sum(move + (score + backward[-1]), 1))
-    return Posterior(scores, moves, forward, backward[::-1])
+    last = np.asarray(scores[0], np.float64)
+    forward = Ragged().add(last)
+    for t, move in enumerate(moves, 1):
+        last = log_sum(last[:, None] + move, 0) + scores[t]
+        forward.add(last)
+    last = np.zeros(len(scores[-1]))
+    backward = Ragged().add(last)
+    for t in range(len(scores) - 1, 0, -1):
+        last = log_sum(moves[t - 1] + (scores[t] + last), 1)
+        backward.add(last)
+    return Posterior(scores, moves, forward, Made(lambda t: backward[len(backward) - 1 - t], len(backward)))
 
 
 def log_sum(x: Floats, axis: int) -> Floats:

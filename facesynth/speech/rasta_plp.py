@@ -4,6 +4,8 @@ torchaudio has mel cepstra, but no critical bands, no all-pole model and no RAST
 the filter, keeps no state between pieces.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -65,36 +67,43 @@ class RastaPlp(nn.Module):
 
     def forward(self, audio: Tensor) -> Tensor:
         """Audio [..., S], -1..1, to cepstra [..., 1 + S // hop, order + 1], float32."""
-        energies = self.band_energies(audio)
-        filtered = self.filter_along_time(energies.log())
-        return self.cepstra(torch.exp((filtered + self.loudness.log()) / 3)).to(torch.float32)
+        found, earlier = [], None
+        for energies in self.band_energies(audio):
+            filtered, earlier = self.filter_along_time(energies.log(), earlier)
+            found.append(self.cepstra(torch.exp((filtered + self.loudness.log()) / 3)).to(torch.float32))
+        return torch.cat(found, dim=-2)
 
-    def band_energies(self, audio: Tensor) -> Tensor:
+    def band_energies(self, audio: Tensor) -> Iterator[Tensor]:
         """Audio [..., S] to the power in each critical band [..., frames, bands], in double precision, some frames at a time."""
-        length, half = len(self.window), len(self.window) // 2
-        padded = functional.pad(audio, (half, length - half + self.hop))
-        frames = padded.unfold(-1, length, self.hop)[..., : 1 + audio.shape[-1] // self.hop, :]
-        return torch.cat([self._energies_of(some) for some in torch.split(frames, FRAMES_TOGETHER, dim=-2)], dim=-2)
+        count, length, half = audio.shape[-1], len(self.window), len(self.window) // 2
+        frames = 1 + count // self.hop
+        for first in range(0, frames, FRAMES_TOGETHER):
+            start, stop = (min(k, frames) * self.hop - half for k in (first, first + FRAMES_TOGETHER))
+            heard = audio[..., max(0, start) : stop + length]
+            missing = max(0, -start), max(0, stop + length - count)
+            windows = functional.pad(heard, missing).unfold(-1, length, self.hop)
+            yield self._energies_of(windows[..., : min(FRAMES_TOGETHER, frames - first), :])
 
     def _energies_of(self, frames: Tensor) -> Tensor:
         power = torch.fft.rfft(frames.to(self.window.dtype) * self.window, self.fft).abs() ** 2
         floor = ROUNDING_POWER * self.window.square().sum()
         return (power + floor) @ self.bands
 
-    def filter_along_time(self, log_energies: Tensor) -> Tensor:
-        """Band-pass each band's logarithm [..., frames, bands] along time.
+    def filter_along_time(self, log_energies: Tensor, earlier: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """Band-pass each band's logarithm [..., frames, bands] along time; beside it what to begin with when it goes on.
 
         H(z) = (0.2 + 0.1 z^-1 - 0.1 z^-3 - 0.2 z^-4) / (1 - pole z^-1). A fixed linear channel adds a
         constant to the logarithm, and H(1) = 0 removes it. The impulse response is written out until it
         has fallen below 1e-9, so that the filter is one convolution. The first frame is taken to have
         lasted forever, so that no transient marks the beginning.
         """
-        bands = log_energies.shape[-1]
+        bands, reach = log_energies.shape[-1], len(self.rasta) - 1
         along_time = log_energies.reshape(-1, *log_energies.shape[-2:]).transpose(1, 2)
-        padded = functional.pad(along_time, (len(self.rasta) - 1, 0), mode="replicate")
+        earlier = along_time[..., :1].expand(-1, -1, reach) if earlier is None else earlier
+        padded = torch.cat([earlier, along_time], dim=-1)
         kernel = self.rasta.flip(0).expand(bands, 1, -1)
         filtered = functional.conv1d(padded, kernel, groups=bands)
-        return filtered.transpose(1, 2).reshape(log_energies.shape)
+        return filtered.transpose(1, 2).reshape(log_energies.shape), padded[..., -reach:].clone()
 
     def cepstra(self, auditory: Tensor) -> Tensor:
         """Auditory spectrum [..., bands] to the cepstra [..., order + 1] of its all-pole model.

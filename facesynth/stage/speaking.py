@@ -85,9 +85,10 @@ class Production:
         options = self.cast.options(self.request, heard.speech.phones)
         motion = self.cast.motion(heard.speech, self.request, options)
         shown = self.stage.perform(motion, heard.speech, self.cast)
-        facts = self._account(heard.speech, options, remark) | {"parts": dict(shown.sources)}
+        said = self.cast.said(heard.speech)
+        facts = self._account(said, options, remark) | {"parts": dict(shown.sources)}
         remark("; ".join(f"{part}: {source}" for part, source in shown.sources.items()))
-        written = [*self._explain(heard.speech, options)]
+        written = [*self._explain(said, options)]
         for target in targets:
             done = shown.write(target)
             remark(done.line)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout
 
-from facesynth.inference.anime_graph.assembly import blend
+from facesynth.inference.anime_graph.assembly import Blender, make_piece
 from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.closures import ClosingLips, close_at
 from facesynth.inference.errors import FacesynthError
@@ -53,7 +53,7 @@ def test_a_recorded_sentence_returns_itself_without_a_jump(corpus, model):
         plan = model.plan(utterance.speech)
         assert plan.cost == 0
         assert not plan.jumps.any()
-        motion, _ = blend(model.chooser, plan, model.fps)
+        motion = model.runtime().joined(plan)
         np.testing.assert_allclose(motion, model.components.encode_array(utterance.motion.frames), atol=1e-4)
 
 
@@ -83,7 +83,7 @@ def test_save_and_load_give_the_same_bytes(unseen, tmp_path):
 
 def test_what_smoothing_leaves_lies_below_the_cutoffs(unseen):
     model, utterance = unseen
-    blended, _ = blend(model.chooser, model.plan(utterance.speech), model.fps)
+    blended = model.runtime().joined(model.plan(utterance.speech))
     smooth = LowPass(model.cutoffs_hz.numpy(), model.fps)(blended)
     assert model.cutoffs_hz.shape == (smooth.shape[1],)
     assert share_above(smooth, model).max() <= 0.01
@@ -265,8 +265,14 @@ def test_a_minute_of_speech(model, corpus):
 def test_jumps_can_be_bridged_without_recorded_pairs(corpus, unseen):
     model, utterance = unseen
     plain = AnimeGraph(help_pairs=False).fit(corpus.split()[0])
-    plans = [(m, m.plan(utterance.speech), m.config["help_pairs"]) for m in (model, plain)]
-    hows = [{j.how for j in blend(m.chooser, plan, m.fps, help_pairs=h)[1].joins.values()} for m, plan, h in plans]
+    hows = []
+    for m in (model, plain):
+        plan, blender = m.plan(utterance.speech), Blender(m.chooser, m.fps, help_pairs=m.config["help_pairs"])
+        for t, recorded in enumerate([False, *~plan.jumps]):
+            blender.add(make_piece(m.chooser, plan.wishes[t], plan.candidates[t], plan.path[t]), recorded)
+        frames = [blender.blended(t) for t in range(len(plan.path))]
+        np.testing.assert_array_equal(np.concatenate(frames), m.runtime().joined(plan))
+        hows.append({join.how for join in blender.joins.values()})
     assert "help" in hows[0]
     assert hows[1] == {"extension"}
 

@@ -5,7 +5,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from facesynth.inference.anime_graph.assembly import blend
 from facesynth.inference.anime_graph.lowpass import LowPass
 from facesynth.inference.lips import bilabial_spans, lip_gap
 from facesynth.methods.anime_graph.lowpass import energy_spectrum
@@ -58,7 +57,7 @@ def test_no_component_holds_energy_above_its_cut_off(split, model):
     low_pass = LowPass(cutoffs_hz, model.fps)
     smooth, kept, captured = [], 0.0, 0.0
     for utterance in split[1]:
-        blended, _ = blend(model.chooser, model.plan(utterance.speech), model.fps)
+        blended = model.runtime().joined(model.plan(utterance.speech))
         smooth.append(low_pass(blended))
         complete = utterance.motion.frames[np.isfinite(utterance.motion.frames).all(axis=1)]
         motion = model.components.encode_array(complete)

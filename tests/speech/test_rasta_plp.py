@@ -5,6 +5,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import butter, freqz, lfilter
 
 from facesynth.inference.errors import FacesynthError
+from facesynth.speech import rasta_plp
 from facesynth.speech.rasta_plp import (
     RastaPlp,
     critical_bands,
@@ -90,12 +91,20 @@ def test_a_fixed_channel_barely_moves_the_features():
     plp = RastaPlp()
     clean, coloured = plp(torch.from_numpy(audio)), plp(torch.from_numpy(through_channel))
     without = [
-        plp.cepstra((plp.band_energies(torch.from_numpy(a).double()) * plp.loudness) ** (1 / 3)) for a in (audio, through_channel)
+        plp.cepstra((torch.cat([*plp.band_energies(torch.from_numpy(a).double())]) * plp.loudness) ** (1 / 3))
+        for a in (audio, through_channel)
     ]
     moved = (clean - coloured)[50:, 1:].square().mean() / clean[50:, 1:].var(0).mean()
     moved_without = (without[0] - without[1])[50:, 1:].square().mean() / without[0][50:, 1:].var(0).mean()
     assert moved < 0.1
     assert moved < 0.1 * moved_without
+
+
+def test_a_long_sound_is_heard_some_frames_at_a_time_as_the_whole_is(monkeypatch):
+    audio = torch.from_numpy(speechlike(4, 5.0))
+    whole = RastaPlp()(audio)
+    monkeypatch.setattr(rasta_plp, "FRAMES_TOGETHER", 64)
+    torch.testing.assert_close(RastaPlp()(audio), whole, rtol=0, atol=0)
 
 
 def test_loudness_of_the_recording_does_not_matter():
@@ -115,7 +124,8 @@ def test_frames_lie_on_a_grid_of_the_hop():
     assert RastaPlp().fps == 100
     click = torch.zeros(RATE)
     click[8000] = 0.9
-    energy = RastaPlp().band_energies(click.double()).sum(-1)
+    (energies,) = RastaPlp().band_energies(click.double())
+    energy = energies.sum(-1)
     assert energy.argmax() == 50
 
 

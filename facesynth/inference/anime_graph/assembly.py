@@ -1,12 +1,13 @@
 """From chosen nodes to one continuous motion: time-warp and blending (Cao 2005, §4.3)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..filters import gaussian
+from ..long_arrays import joined
 from ..warp import time_warp
 from .audio_cost import warp_path, warp_paths
 from .candidates import Candidates, Chooser
@@ -16,6 +17,8 @@ VELOCITY_LASTS_S = 0.04
 """Time constant with which an extrapolated movement comes to rest."""
 WARP_SMOOTHING = 2.0
 """Standard deviation, in feature frames, of the smoothing of a time-warp."""
+LATER = 2
+"""Pieces after one that must be known before its frames are: the next one's other join decides how it is bridged."""
 LEAST_SHARE = 1e-3
 """Candidates that are less probable than this are left out of a mean."""
 
@@ -98,7 +101,8 @@ class Blender:
 
     def __init__(self, chooser: Chooser, fps: float, *, help_pairs: bool = True) -> None:
         self.chooser, self.fps, self.help_pairs = chooser, fps, help_pairs
-        self.pieces: list[Piece] = []
+        self.pieces: dict[int, Piece] = {}
+        """By their number, without those that no frame depends on any more."""
         self.jumps: list[bool] = []
         """For each piece whether it was jumped to."""
         self.joins: dict[int, Join] = {}
@@ -106,8 +110,8 @@ class Blender:
 
     def add(self, piece: Piece, captured: bool) -> None:
         """The next piece; `captured`: it was recorded right after the one before."""
-        self.jumps.append(bool(self.pieces) and not captured)
-        self.pieces.append(piece)
+        self.jumps.append(bool(self.jumps) and not captured)
+        self.pieces[len(self.jumps) - 1] = piece
 
     def blended(self, t: int) -> Floats:
         """[n, D] piece t with the joins on both of its sides; those that are not known yet count as captured."""
@@ -116,6 +120,13 @@ class Blender:
             motion = motion + self._join(t).right
         if self._jumped(t + 1):
             motion = motion + self._join(t + 1).left
+        return motion
+
+    def final(self, t: int) -> Floats:
+        """`blended`, of which the next two pieces are known; what lies before it is forgotten, as it is not asked for again."""
+        motion = self.blended(t)
+        self.pieces.pop(t - 1, None)
+        self.joins.pop(t, None)
         return motion
 
     def _jumped(self, t: int) -> bool:
@@ -176,23 +187,30 @@ class Blender:
         return Join("extension", rise[:p, None] * (backward - left.motion), (1 - rise[p:, None]) * (onward - right.motion))
 
 
-def blend(chooser: Chooser, plan: Plan, fps: float, *, help_pairs: bool = True) -> tuple[Floats, Blender]:
-    """[frames, D] blended motion of a plan, not yet smoothed, and what became of its jumps."""
-    blender = Blender(chooser, fps, help_pairs=help_pairs)
+def blend(chooser: Chooser, plan: Plan, blender: Blender) -> Floats:
+    """[frames, D] blended motion of a plan, not yet smoothed."""
+    return joined(_blended(chooser, plan, blender), np.float64)
+
+
+def _blended(chooser: Chooser, plan: Plan, blender: Blender) -> Iterator[Floats]:
     captured = [False, *(~plan.jumps).tolist()]
-    for wish, candidates, chosen, recorded in zip(plan.wishes, plan.candidates, plan.path, captured, strict=True):
-        blender.add(make_piece(chooser, wish, candidates, int(chosen)), recorded)
-    return np.concatenate([blender.blended(t) for t in range(len(blender.pieces))]), blender
+    for t, recorded in enumerate(captured):
+        blender.add(make_piece(chooser, plan.wishes[t], plan.candidates[t], int(plan.path[t])), recorded)
+        if t >= LATER:
+            yield blender.final(t - LATER)
+    yield from (blender.final(t) for t in range(max(0, len(captured) - LATER), len(captured)))
 
 
 def mean_motion(chooser: Chooser, plan: Plan, shares_of: Sequence[Floats]) -> Floats:
     """[frames, D] each phone the mean of its candidates by their shares [n], brought to its time; not yet smoothed."""
-    frames = []
+    return joined(_means(chooser, plan, shares_of), np.float64)
+
+
+def _means(chooser: Chooser, plan: Plan, shares_of: Sequence[Floats]) -> Iterator[Floats]:
     for wish, candidates, shares in zip(plan.wishes, plan.candidates, shares_of, strict=True):
         likely = np.flatnonzero(shares >= min(LEAST_SHARE, shares.max()))
         pieces = likely_motions(chooser, wish, candidates, likely)
-        frames.append(np.tensordot(shares[likely] / shares[likely].sum(), pieces, 1))
-    return np.concatenate(frames)
+        yield np.asarray(np.tensordot(shares[likely] / shares[likely].sum(), pieces, 1))
 
 
 def _rising(count: int, shared: bool) -> Floats:

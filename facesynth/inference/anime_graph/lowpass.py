@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..filters import butterworth, forth_and_back
+from ..long_arrays import copied, let_go, row_blocks
 
 ORDER = 6
 """Order of the Butterworth filter, which runs forth and back."""
@@ -25,10 +26,18 @@ class LowPass:
 
     def __call__(self, components: Floats) -> Floats:
         """Components [T, D], smooth."""
-        smooth, columns = components.copy(), self.filtered
-        if len(columns) and len(components) > 1:
-            reach = np.minimum(len(components) - 1, self._reach)
-            smooth[:, columns] = forth_and_back(self._sections, components[:, columns], reach)
+        columns = self.filtered
+        if not len(columns) or len(components) < 2:
+            return components.copy()
+        reach = np.minimum(len(components) - 1, self._reach)
+        every = len(columns) == components.shape[1]
+        filtered = forth_and_back(self._sections, components if every else components[:, columns], reach)
+        if every:
+            return filtered
+        smooth = copied(components)
+        for rows in row_blocks(filtered):
+            smooth[rows, columns] = filtered[rows]
+            let_go(smooth)
         return smooth
 
     @cached_property

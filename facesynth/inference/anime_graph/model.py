@@ -13,13 +13,14 @@ from ..closures import close_at
 from ..errors import FacesynthError, reject_options, unknown
 from ..expectation import Bands, Expectation, Said
 from ..filters import sharpen
+from ..last_search import LastSearch
 from ..layout import Layout
 from ..lips import bilabial_spans
 from ..long_arrays import by_blocks
 from ..motion import Motion
 from ..phones import PHONE_INDEX, PHONES
 from ..speech import Speech
-from .assembly import blend, mean_motion
+from .assembly import Blender, blend, mean_motion
 from .candidates import Chooser
 from .emotions import EmotionMapper
 from .graph import Graph
@@ -68,6 +69,8 @@ class AnimeGraph:
     sharpening: float = 0.0
     help_pairs: bool = True
     search: PathSearch = NUMPY
+    last: LastSearch[dict[str, Any]] = field(default_factory=LastSearch)
+    """The summary of the plan of the last speech that was said."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that it comes from."""
 
@@ -95,7 +98,13 @@ class AnimeGraph:
         to_emotion, to_intensity: find motion in the speech's own emotion and map it to this one.
         """
         reject_options("anime_graph", options, OPTIONS)
-        smooth = self.low_pass(self.joined(self.plan(speech, look_ahead=look_ahead)))
+        plan = self.plan(speech, look_ahead=look_ahead)
+        self.last.keep(speech, (look_ahead,), plan.summary())
+        return self.moved(speech, plan, to_emotion=to_emotion, to_intensity=to_intensity)
+
+    def moved(self, speech: Speech, plan: Plan, *, to_emotion: str | None = None, to_intensity: float = 1.0) -> Motion:
+        """The motion of the speech that was planned; the rest as in `synthesize`."""
+        smooth = self.low_pass(self.joined(plan))
         frames = by_blocks(self.decode, sharpen(smooth, self.sharpening, self.fps), np.float64)
         frames = close_at(frames, self.layout, bilabial_spans(speech.phones, self.fps), self.closed_gap, self.fps)
         motion = self.mapper.with_intensity(Motion(by_blocks(np.asarray, frames), self.fps, self.layout), speech)
@@ -105,7 +114,7 @@ class AnimeGraph:
         """[frames, D] the phones one after the other, not yet smoothed."""
         if self.temperature > 0:
             return mean_motion(self.chooser, plan, self.search.soft_path(plan.steps, self.weights, self.temperature))
-        return blend(self.chooser, plan, self.fps, help_pairs=self.help_pairs)[0]
+        return blend(self.chooser, plan, Blender(self.chooser, self.fps, help_pairs=self.help_pairs))
 
     def plan(self, speech: Speech, *, look_ahead: int | None = None) -> Plan:
         """The path through the graph that expresses speech."""

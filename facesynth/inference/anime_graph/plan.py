@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..phones import PHONES
+from ..ragged import Made, Ragged
 from .candidates import Candidates, Chooser, make_step
 from .graph import VISEME_OF, Graph
 from .search import NUMPY, PathSearch, Step, Weights, jumps, look_ahead_path, path_cost
@@ -72,12 +73,21 @@ class Plan:
         }
 
 
-def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: Floats) -> tuple[list[Candidates], list[Step]]:
-    """Candidates and their costs for each phone."""
+def lay_steps(chooser: Chooser, wishes: Sequence[Wish], metric: Floats) -> tuple[list[Candidates], Sequence[Step]]:
+    """Candidates and their costs for each phone; what is a phone's own of them lies in a file where it is much."""
     candidates = [chooser.candidates(wish.phone, wish.emotion) for wish in wishes]
-    before = [None, *candidates[:-1]]
-    steps = [make_step(chooser, c, b, w.wanted, metric, w.expected) for c, b, w in zip(candidates, before, wishes, strict=True)]
-    return candidates, steps
+    audio, pose, link = Ragged(), Ragged(), Ragged(np.int64)
+    for c, before, wish in zip(candidates, [None, *candidates[:-1]], wishes, strict=True):
+        step = make_step(chooser, c, before, wish.wanted, metric, wish.expected)
+        audio.add(step.audio)
+        link.add(step.link)
+        pose.add(np.zeros(0) if step.pose is None else step.pose)
+
+    def laid(t: int) -> Step:
+        expected = pose[t] if wishes[t].expected is not None else None
+        return Step(audio[t], *chooser.ends(candidates[t], metric), link[t], expected)
+
+    return candidates, Made(laid, len(candidates))
 
 
 def make_plan(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FacesynthError
 from ..posterior import posterior
+from ..ragged import Made, Ragged
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,11 @@ def best_path(steps: Sequence[Step], weights: Weights, *, start: int | None = No
     phi = weights.target(steps[0])
     if start is not None:
         phi = np.where(np.arange(len(phi)) == start, phi, np.inf)
-    origins = []
+    origins = Ragged(np.int32)
     for before, step in pairwise(steps):
         reached, origin = _advance(phi, before, step, weights)
         phi = reached + weights.target(step)
-        origins.append(origin)
+        origins.add(origin)
     path = [int(phi.argmin())]
     for origin in reversed(origins):
         path.append(int(origin[path[-1]]))
@@ -81,7 +82,7 @@ def _advance(phi: Floats, before: Step, step: Step, weights: Weights) -> tuple[F
     return np.minimum(captured, least), np.where(captured <= least, step.link, kept[best])
 
 
-def soft_path(steps: Sequence[Step], weights: Weights, temperature: float) -> list[Floats]:
+def soft_path(steps: Sequence[Step], weights: Weights, temperature: float) -> Sequence[Floats]:
     """The posterior probability [n] of each candidate of each phone; temperature in the unit of eq. 2, above 0.
 
     The same recursion as in `best_path`, with `-tau log sum exp(-· / tau)` in the place of `min`; tau -> 0 is the
@@ -89,8 +90,9 @@ def soft_path(steps: Sequence[Step], weights: Weights, temperature: float) -> li
     """
     if not temperature > 0:
         raise FacesynthError(f"a soft search needs a temperature above 0; got {temperature:g}: take best_path instead")
-    moves = [-step_costs(before, step, weights) / temperature for before, step in pairwise(steps)]
-    return posterior([-weights.target(step) / temperature for step in steps], moves).shares()
+    scores = Made(lambda t: -weights.target(steps[t]) / temperature, len(steps))
+    moves = Made(lambda t: -step_costs(steps[t], steps[t + 1], weights) / temperature, len(steps) - 1)
+    return posterior(scores, moves).shares()
 
 
 def step_costs(before: Step, step: Step, weights: Weights) -> Floats:
@@ -174,7 +176,7 @@ class PathSearch:
     """An engine: what finds paths, on whatever device."""
 
     best_path: Callable[[Sequence[Step], Weights], tuple[Ints, float]]
-    soft_path: Callable[[Sequence[Step], Weights, float], list[Floats]]
+    soft_path: Callable[[Sequence[Step], Weights, float], Sequence[Floats]]
 
 
 NUMPY = PathSearch(best_path, soft_path)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..closures import ClosingLips
 from ..errors import FacesynthError
 from ..phones import BILABIALS, PHONES
-from .assembly import Blender, make_piece
+from .assembly import LATER, Blender, make_piece
 from .candidates import Candidates, make_step
 from .hearing import Ear
 from .plan import Wish
@@ -80,8 +80,8 @@ class WishStream:
             self.path.append(candidate)
 
     def _emit(self, *, last: bool) -> NDArray[np.float32]:
-        model, ready = self.model, len(self.blender.pieces) - (0 if last else 2)
-        fresh = [self.blender.blended(t) for t in range(self._pieces_done, ready)]
+        model, ready = self.model, len(self.blender.jumps) - (0 if last else LATER)
+        fresh = [self.blender.final(t) for t in range(self._pieces_done, ready)]
         self._pieces_done = max(self._pieces_done, ready)
         self._blended = np.concatenate([self._blended, *fresh])
         stop = max(self._smooth_done, len(self._blended) - (0 if last else self.guard))

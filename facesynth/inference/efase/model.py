@@ -22,6 +22,7 @@ from ..efase.steps import cost_along, step_matrix
 from ..efase.stream import EfaseStream
 from ..errors import FacesynthError, reject_options, unknown
 from ..filters import at_rate, sharpen
+from ..last_search import LastSearch
 from ..layout import Layout
 from ..lips import gap, has_lips
 from ..long_arrays import Growing, by_blocks, row_blocks
@@ -96,6 +97,7 @@ class Efase:
         self.hearing, self.database_fps = parts.hearing, parts.settings.database_fps
         self._captured = set(parts.nodes.visemes.tolist())
         self._gaps: dict[int, float] = {}
+        self._last: LastSearch[dict[str, float]] = LastSearch()
 
     @cached_property
     def index(self) -> SearchIndex:
@@ -127,7 +129,9 @@ class Efase:
         new_fps = self.fps if fps is None else float(fps)
         if not (np.isfinite(new_fps) and new_fps > 0):
             raise FacesynthError(f"fps is {fps}; wanted a positive rate in Hz, or None for the model's {self.fps:g}")
-        return self.moved(speech, self.plans(speech, constraints=constraints, look_ahead=look_ahead), new_fps)
+        plans = self.plans(speech, constraints=constraints, look_ahead=look_ahead)
+        self._last.keep(speech, (dict(constraints or {}), look_ahead), self._shares(plans[0]))
+        return self.moved(speech, plans, new_fps)
 
     def plans(self, speech: Speech, *, constraints: Mapping[int, str] | None = None, look_ahead: int | None = None) -> list[Plan]:
         """One in the emotions of the track and, where one of those is weak, one in neutral."""
@@ -220,7 +224,9 @@ class Efase:
 
     def report(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> dict[str, float]:
         """Shares of phones said by another phone, viseme class or emotion."""
-        plan = self.plan(speech, constraints=constraints)
+        return self._last.of(speech, (dict(constraints or {}), None), lambda: self._shares(self.plan(speech, constraints=constraints)))
+
+    def _shares(self, plan: Plan) -> dict[str, float]:
         return shares(self.nodes, plan.query, plan.nodes)
 
     def joins(self, speech: Speech) -> Ints:

@@ -21,6 +21,7 @@ from facesynth.inference.anime_graph.search import NUMPY, Weights
 from facesynth.inference.anime_graph.stream import WishStream
 from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.last_search import LastSearch
 from facesynth.inference.lips import bilabial_spans, narrowest_gaps
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import Speech
@@ -118,6 +119,7 @@ class AnimeGraph(Method):
         self.map_settings = MapSettings(map_width, map_kernel, map_centres)
         self.nodes = nn.Module()
         self._chooser: Chooser | None = None
+        self._last: LastSearch[dict[str, Any]] = LastSearch()
 
     @property
     def weights(self) -> Weights:
@@ -161,7 +163,7 @@ class AnimeGraph(Method):
         if self.predictor is not None:
             self.predictor.learn(corpus, lambda frames: self.in_metric(frames.cpu()).to(device), seed)
         self._fit_maps([take for take in takes if take is not None], seed)
-        self._chooser = None
+        self._chooser, self._last = None, LastSearch()
         return self.to(device)
 
     def in_metric(self, frames: torch.Tensor) -> torch.Tensor:
@@ -237,6 +239,7 @@ class AnimeGraph(Method):
             temperature=config["temperature"],
             sharpening=config["sharpening"],
             help_pairs=config["help_pairs"],
+            last=self._last,
             search=NUMPY if (device := self.cutoffs_hz.device).type == "cpu" else torch_search(device),
         )
 
@@ -266,7 +269,7 @@ class AnimeGraph(Method):
 
     def account(self, speech: Speech, *, look_ahead: int | None = None) -> Account:
         """What the graph lacked, and what a look-ahead lost; see `Plan.summary`."""
-        found = self.plan(speech, look_ahead=look_ahead).summary()
+        found = self._last.of(speech, (look_ahead,), lambda: self.plan(speech, look_ahead=look_ahead).summary())
         fallbacks = [item for what in ("phone_fallbacks", "emotion_fallbacks") for item in found[what].items()]
         lacking = f"of {found['phones']} phones are not in the graph as asked for"
         warnings = [f"{count} {lacking}: {level}" for level, count in fallbacks]
