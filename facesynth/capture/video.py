@@ -104,6 +104,7 @@ def _decoded(
         if frame.pts is None:
             continue
         time_s = (float(frame.pts * frame.time_base) if slots is None else next(slots, last_s)) - begin_s
+        time_s = time_s if number else max(time_s, 0.0)
         if frame.is_corrupt or time_s <= last_s:
             damaged.append(time_s)
         if time_s <= last_s:

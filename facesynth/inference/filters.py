@@ -92,7 +92,7 @@ def _back(sections: Floats, there: Floats, own: Ints) -> Floats:
 
 
 class _Cascade:
-    """The sections one after the other, over a signal that comes in pieces [n, C], started in the steady state of the first frame."""
+    """The sections in a row, over a signal that comes in pieces [n, C], started in the steady state of the first frame."""
 
     def __init__(self, sections: Floats) -> None:
         self._sections = sections

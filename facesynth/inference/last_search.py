@@ -25,8 +25,10 @@ class _Asked:
         """Whether it is the same speech with the same options."""
         same = self.audio() is speech.audio and self.phones() is speech.phones and self.options == options
         felt, feels = self.emotions, speech.emotions
-        return same and felt.labels == feels.labels and all(
-            np.array_equal(getattr(felt, name), getattr(feels, name)) for name in ("ends_s", "intensities")
+        return (
+            same
+            and felt.labels == feels.labels
+            and all(np.array_equal(getattr(felt, name), getattr(feels, name)) for name in ("ends_s", "intensities"))
         )
 
 

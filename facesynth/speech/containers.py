@@ -6,6 +6,7 @@ would be early or late against the pictures. So each block is laid where its tim
 Sample 0 is where the first picture or the first sound lies, whichever is earlier: the same moment from which
 `facesynth.capture.video` counts. Encoders put silence in front of the sound, their priming. MP4, Matroska and Ogg say how
 much, and FFmpeg takes it off; MPEG-TS and FLV begin the sound as much before the pictures; raw streams and AVI say nothing.
+Of these it is taken off as far as any encoder puts it there, and told.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +73,8 @@ class Beginning:
     codec: str
     counted: bool = False
     """Whether the container states no times, but counts samples and pictures."""
+    later_s: float = 0.0
+    """By how much the sound lies later than by its own count, on the count of the pictures."""
 
     @property
     def zero_s(self) -> float:
@@ -85,11 +89,12 @@ class Beginning:
         """What a person should know of it."""
         if self.sound_s is None:
             return
-        if self.priming and (self.picture_s is None or self.sound_s == self.picture_s):
-            yield from unstated_priming(self.codec, self.priming if self.picture_s is None else 0, self.rate)
+        if self.priming and (self.picture_s is None or self.counted or self.sound_s == self.picture_s):
+            taken_off = self.priming if self.picture_s is None or self.counted else 0
+            yield from unstated_priming(self.codec, taken_off, self.rate)
         if self.sound_s - self.zero_s > TOLD_S:
             yield f"the sound begins {self.sound_s - self.zero_s:.2f} s after the pictures; until then it is silent"
-        if self.sound_s < -TOLD_S:
+        if self.sound_s < -TOLD_S and not self.counted:
             yield f"the sound's time stamps begin at {self.sound_s:.2f} s; its first sample counts as 0 s" + (
                 "" if self.picture_s is None else f", the first picture as {self.picture_s - self.zero_s:.2f} s"
             )
@@ -124,8 +129,9 @@ def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
     if not blocks:
         return strung, begin.rate, ()
     times_s, lengths = zip(*blocks, strict=True)
-    lost = lost_sound(path) if begin.counted else ()
-    audio, remarks = laid(path, strung, lengths, _later(np.array(times_s) - begin.zero_s, lost), begin.rate)
+    lost = lost_sound(path, begin.later_s) if begin.counted else ()
+    counted_s = _later(np.array(times_s), lost) + begin.later_s
+    audio, remarks = laid(path, strung, lengths, counted_s - begin.zero_s, begin.rate)
     return audio, begin.rate, (*begin.remarks(), *(_said_of_lost(lost) if lost else remarks))
 
 
@@ -157,12 +163,29 @@ def beginning(path: Path) -> Beginning:
             raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
         codec = next((name for name in PRIMED if codec.startswith(name)), codec)
         states = bool(STATED & set(container.format.name.split(",")))
-        known = not states and (picture is None or codec in BESIDE_PICTURES)
-        sound = _first_frame(container, [stream])
-        priming = PRIMED.get(codec, 0) if known else 0
         counted = container.format.name == COUNTING
-        seen_s = 0.0 if counted and picture is not None else _time_s(picture)
-        return Beginning(_time_s(sound) or 0.0, seen_s, priming, rate, codec, counted)
+        known = not states and (picture is None or counted or codec in BESIDE_PICTURES)
+        priming = PRIMED.get(codec, 0) if known else 0
+        if counted and picture is not None:
+            return _counted(container, priming, rate, codec)
+        sound = _first_frame(container, [stream])
+        return Beginning(_time_s(sound) or 0.0, _time_s(picture), priming, rate, codec, counted)
+
+
+# AVI counts: sound and pictures both begin at 0, so that the sound is late by its priming. Writers that know of it (FFmpeg) leave
+# as many places empty, in whole pictures, before the first picture or behind it: where as many are there, all that follow belong
+# to the sound after the priming, to the sample.
+def _counted(container: InputContainer, priming: int, rate: int, codec: str) -> Beginning:
+    """When sound and pictures of an AVI begin, on the count of its pictures."""
+    stream = container.streams.video[0]
+    places = islice((packet.dts for packet in container.demux(stream) if packet.size and packet.dts is not None), 2)
+    first, second = (*places, 0, 0)[:2]
+    unit_s, late_s = float(stream.time_base or 0), priming / rate
+    empty = second - 1
+    held_back = empty > 0 and abs(empty * unit_s - late_s) < unit_s
+    seen_s = unit_s * (empty if held_back else first)
+    sound_s = seen_s - late_s if held_back else -late_s
+    return Beginning(sound_s, seen_s, priming, rate, codec, counted=True, later_s=sound_s)
 
 
 def _first_frame(container: InputContainer, streams: Sequence[Any]) -> Any:

@@ -37,6 +37,8 @@ class Chunks(NamedTuple):
     """[N] time of the picture that lies after, inf for none."""
     shorter_s: float
     """By how much the sound is shorter than the pictures."""
+    held_s: float = 0.0
+    """By how much pictures lie before the sound of their time: what others are predicted from lies before it is shown."""
 
 
 def chunks_of(path: Path) -> Chunks | None:
@@ -60,19 +62,34 @@ def chunks_of(path: Path) -> Chunks | None:
     ends_s = [rows[-1][2] + rows[-1][3] * unit for rows, unit in zip((heard, seen), units, strict=True)]
     places = np.searchsorted([row[0] for row in seen], [row[0] for row in heard])
     framed = np.concatenate([[-np.inf], np.maximum.accumulate(seen_s), [np.inf]])
-    return Chunks(times_s, framed[places], framed[places + 1], ends_s[1] - ends_s[0])
+    held_s = _held_back(path) * units[1]
+    return Chunks(times_s, framed[places], framed[places + 1], ends_s[1] - ends_s[0], held_s)
 
 
-def lost_sound(path: Path) -> tuple[tuple[float, float], ...]:
+def _held_back(path: Path) -> int:
+    """How many more pictures must be known than the first that is shown, for others are predicted from them."""
+    import av
+
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        stream.thread_type = "NONE"
+        for number, packet in enumerate(container.demux(stream)):
+            if packet.decode():
+                return number
+    return 0
+
+
+def lost_sound(path: Path, later_s: float) -> tuple[tuple[float, float], ...]:
     """Gaps in the sound of a file that FFmpeg opens: when, by the sound's own count, and how long, seconds.
 
-    None where they do not account for what the sound lacks.
+    later_s: by how much the sound lies later than by its own count where nothing is lost. None where they do not account for
+    what the sound lacks.
     """
     chunks = chunks_of(path)
-    return () if chunks is None else gaps_between(chunks)
+    return () if chunks is None else gaps_between(chunks, later_s)
 
 
-def gaps_between(chunks: Chunks) -> tuple[tuple[float, float], ...]:
+def gaps_between(chunks: Chunks, later_s: float = 0.0) -> tuple[tuple[float, float], ...]:
     """The same of chunks."""
     delays = (chunks.before_s + chunks.after_s) / 2 - chunks.times_s
     inside = np.isfinite(delays)
@@ -87,7 +104,8 @@ def gaps_between(chunks: Chunks) -> tuple[tuple[float, float], ...]:
     chosen = np.flatnonzero(inside)
     stretches = [chosen[first:stop] for first, stop in pairwise(edges)]
     delays_s = [_delay(chunks, rows) for rows in stretches]
-    before_s = [0.0 if delays_s[0] > LEAP_S else delays_s[0], *delays_s[:-1]]
+    usual_s = later_s + chunks.held_s
+    before_s = [usual_s if delays_s[0] - usual_s > LEAP_S else delays_s[0], *delays_s[:-1]]
     begins_s = [0.0, *(float(chunks.times_s[rows[0]]) for rows in stretches[1:])]
     found = zip(begins_s, np.subtract(delays_s, before_s), strict=True)
     gaps = tuple((begin_s, float(length_s)) for begin_s, length_s in found if length_s > LEAP_S)

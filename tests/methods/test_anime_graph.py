@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus, tiny_layout
 
+from facesynth.inference import long_arrays, ragged
 from facesynth.inference.anime_graph.assembly import Blender, make_piece
 from facesynth.inference.anime_graph.lowpass import LowPass
+from facesynth.inference.anime_graph.model import AnimeGraph as Runtime
 from facesynth.inference.closures import ClosingLips, close_at
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.lips import bilabial_spans, lip_gap
@@ -293,3 +295,22 @@ def test_with_a_temperature_the_motion_is_the_mean_over_paths(unseen):
 def test_a_temperature_below_zero():
     with pytest.raises(FacesynthError, match="temperature"):
         AnimeGraph(temperature=-1.0)
+
+
+def test_an_account_needs_no_second_search(unseen, monkeypatch):
+    model, utterance = unseen
+    model.synthesize(utterance.speech)
+    summary = model.plan(utterance.speech).summary()
+    monkeypatch.setattr(Runtime, "plan", lambda *_args, **_options: pytest.fail("searched again"))
+    assert model.account(utterance.speech).facts == summary
+    with pytest.raises(pytest.fail.Exception, match="searched again"):
+        model.account(utterance.speech, look_ahead=3)
+
+
+def test_what_lies_in_files_gives_the_same_motion(unseen, monkeypatch):
+    model, utterance = unseen
+    wanted = model.synthesize(utterance.speech).frames
+    monkeypatch.setattr(long_arrays, "LARGE_BYTES", 64)
+    monkeypatch.setattr(long_arrays, "BLOCK_ROWS", 16)
+    monkeypatch.setattr(ragged, "LOOKED_AT", 3)
+    assert model.synthesize(utterance.speech).frames.tobytes() == wanted.tobytes()

@@ -43,6 +43,8 @@ class Clip:
     """When pictures are taken."""
     moved: tuple[tuple[float, float], ...] = ()
     """(from, by) s: packets of sound from one time on carry later stamps. Clicks are laid so that they sound at the closures."""
+    fps: float = 30.0
+    """Rate of an AVI, Hz, which counts pictures; others note when each is taken."""
     overlapping: int = 0
     """So many packets of sound, from 1 s on, come after half a packet's time each."""
 
@@ -75,25 +77,27 @@ def write(path: Path, clip=Clip(), codecs=None, pictures=True) -> Path:
     """Pictures and sound, or the sound alone, in the container that the suffix says."""
     for_pictures, for_sound = codecs or CONTAINERS[path.suffix[1:]]
     with av.open(str(path), "w") as container:
-        video = container.add_stream(for_pictures, rate=1000 if for_pictures != "mpeg4" else 30) if pictures else None
+        counting = path.suffix == ".avi"
+        rate = Fraction(clip.fps).limit_denominator(1001) if counting else 1000
+        video = container.add_stream(for_pictures, rate=rate) if pictures else None
         heard = container.add_stream(for_sound, rate=RATE, layout="mono")
         if video is not None:
             video.width = video.height = SIZE
             video.pix_fmt = "yuv420p"
             video.bit_rate = 2_000_000
-            for packet in encoded_pictures(video, clip):
+            for packet in encoded_pictures(video, clip, counting):
                 container.mux(packet)
         for packet in encoded_sound(heard, clip):
             container.mux(packet)
     return path
 
 
-def encoded_pictures(stream, clip):
+def encoded_pictures(stream, clip, counting):
     for number, time_s in enumerate(clip.pictures_s):
         frame = av.VideoFrame.from_ndarray(picture(opening(clip, time_s)), format="rgb24")
         rate = stream.codec_context.framerate
-        frame.pts = number if rate == 30 else round(time_s * rate)
-        frame.time_base = Fraction(1, int(rate))
+        frame.pts = number if counting else round(time_s * rate)
+        frame.time_base = 1 / Fraction(rate)
         yield from stream.encode(frame)
     yield from stream.encode()
 

@@ -59,10 +59,11 @@ AVI = {
 }
 
 
+@pytest.mark.parametrize("pictures", ["mpeg4", "libx264"])
 @pytest.mark.parametrize("sound", ["libmp3lame", "pcm_s16le", "ac3", "aac"])
 @pytest.mark.parametrize("kind", sorted(AVI))
-def test_sound_lost_from_an_avi_is_found_by_the_pictures_beside_it(tmp_path, kind, sound):
-    path = write(tmp_path / "a.avi", AVI[kind], ("mpeg4", sound))
+def test_sound_lost_from_an_avi_is_found_by_the_pictures_beside_it(tmp_path, kind, sound, pictures):
+    path = write(tmp_path / "a.avi", AVI[kind], (pictures, sound))
     assert largest_error_s(path, AVI[kind]) < CLOSE_S
     assert any(remark.startswith("AVI states no times, and some of the sound was lost") for remark in read_sound(path).remarks)
 

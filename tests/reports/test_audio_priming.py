@@ -3,18 +3,28 @@
 import bringing
 import numpy as np
 import pytest
-from closing_clips import CONTAINERS, Clip, at_30_fps, heard_s, largest_error_s, write
+from closing_clips import CONTAINERS, Clip, heard_s, largest_error_s, write
 
 from facesynth.capture.clock import clock_between
 from facesynth.speech.audio import load_audio, read_sound
 
 
-@pytest.mark.parametrize(
-    ("suffix", "fps"), [(s, fps) for s in sorted(CONTAINERS) for fps in (30, 60) if s != "avi" or fps == 30]
-)  # the generator writes AVI at 30 fps
+@pytest.mark.parametrize("suffix", sorted(CONTAINERS))
+@pytest.mark.parametrize("fps", [24, 30, 60])
 def test_heard_and_seen_closures_agree_in_every_container(tmp_path, suffix, fps):
-    clip = Clip(pictures_s=at_30_fps(2.0) if fps == 30 else tuple(np.arange(120) / 60))
-    assert largest_error_s(write(tmp_path / f"a.{suffix}", clip), clip) < 0.02
+    clip = Clip(pictures_s=tuple(np.arange(2 * fps) / fps), fps=fps)
+    assert largest_error_s(write(tmp_path / f"a.{suffix}", clip), clip) < 0.005
+
+
+@pytest.mark.parametrize("pictures", ["mpeg4", "libx264"])
+@pytest.mark.parametrize("sound", ["libmp3lame", "aac", "ac3", "mp2", "pcm_s16le"])
+def test_priming_in_an_avi_is_taken_off_whatever_the_pictures_were_held_back_by(tmp_path, pictures, sound):
+    for fps in (25.0, 30000 / 1001, 50.0):
+        clip = Clip(pictures_s=tuple(np.arange(round(2 * fps)) / fps), fps=fps)
+        path = write(tmp_path / "a.avi", clip, (pictures, sound))
+        assert largest_error_s(path, clip) < 0.002
+        told = [remark for remark in read_sound(path).remarks if "samples were taken off" in remark]
+        assert bool(told) == (sound != "pcm_s16le")
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mov", "mkv", "webm", "ts", "flv"])

@@ -224,7 +224,8 @@ class Efase:
 
     def report(self, speech: Speech, *, constraints: Mapping[int, str] | None = None) -> dict[str, float]:
         """Shares of phones said by another phone, viseme class or emotion."""
-        return self._last.of(speech, (dict(constraints or {}), None), lambda: self._shares(self.plan(speech, constraints=constraints)))
+        asked = dict(constraints or {}), None
+        return self._last.of(speech, asked, lambda: self._shares(self.plan(speech, constraints=constraints)))
 
     def _shares(self, plan: Plan) -> dict[str, float]:
         return shares(self.nodes, plan.query, plan.nodes)
