@@ -1,17 +1,14 @@
 """Phones and words in files that people edit: Praat's TextGrid, and lines of `end label`."""
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from facesynth.atomic import write_text
-from facesynth.encoding import decoded
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
+from facesynth.speech.label_lines import NUMBER, in_seconds, line_segments
 from facesynth.speech.phone_labels import label_remarks, notation_of
 from facesynth.speech.praat import read_grid
 from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of, with_confidences
@@ -22,13 +19,6 @@ Words = tuple[Segment, ...]
 """Word, start and end in seconds; silence between words is left out."""
 SAME_LENGTH_S = 0.2
 """A stretch of labels and a sound whose lengths differ by no more are of the same thing."""
-FAR_BEYOND = 50
-"""Whole numbers that go so many times beyond the sound's end are no seconds."""
-UNITS_S: Mapping[str, float] = {
-    **{"units of 100 ns, as HTK counts": 1e-7, "milliseconds": 1e-3},
-    **{f"samples at {rate} Hz, as TIMIT counts": 1 / rate for rate in (8000, 11025, 16000, 22050, 24000, 32000, 44100, 48000)},
-}
-_NUMBER = re.compile(r"[-+]?\d*\.?\d+(e[-+]?\d+)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +57,7 @@ def read_labelled(path: str | Path, duration_s: float | None = None, speaker: st
 def _with_confidences(track: PhoneTrack, said: Sequence[Segment]) -> tuple[PhoneTrack, tuple[str, ...]]:
     """The track with what a tier says of it, and what a person should know where that is no confidence."""
     given = [(label.strip(), start_s, end_s) for label, start_s, end_s in said if label.strip()]
-    wrong = next((label for label, _, _ in given if not (_NUMBER.fullmatch(label) and 0 <= float(label) <= 1)), None)
+    wrong = next((label for label, _, _ in given if not (NUMBER.fullmatch(label) and 0 <= float(label) <= 1)), None)
     if wrong is not None:
         return track, (f"its tier of confidences says {wrong!r:.40} where a number from 0 to 1 was wanted, and is not used",)
     return (with_confidences(track, [(start_s, end_s, float(label)) for label, start_s, end_s in given]) if given else track), ()
@@ -116,49 +106,14 @@ def write_textgrid(path: str | Path, phones: PhoneTrack, words: Sequence[Segment
 
 
 def _from_lines(path: Path, duration_s: float | None) -> Labelled:
-    segments, encoding = _line_segments(path)
-    segments, counted = _in_seconds(segments, duration_s)
+    given, told = line_segments(path)
+    segments, counted = in_seconds(given, duration_s)
     start_s, end_s = (segments[0][1], segments[-1][2]) if segments else (0.0, 0.0)
     begin_s = _offset_s(start_s, end_s, duration_s)
+    kept, mended = following(_shifted(segments, begin_s))
     labels = label_remarks(label for label, _, _ in segments)
-    track, unread = _track(path, _shifted(segments, begin_s), None)
-    return Labelled(track, (), (*_encoded(encoding), *counted, *_moved(begin_s), *labels, *unread))
-
-
-def _in_seconds(segments: list[Segment], duration_s: float | None) -> tuple[list[Segment], tuple[str, ...]]:
-    """Segments whose times are whole numbers far beyond the sound's end in the unit that fits it best, and what is said of it."""
-    last = segments[-1][2] if segments else 0.0
-    whole = all(time == int(time) for _, *times in segments for time in times)
-    if duration_s is None or not whole or last < FAR_BEYOND * duration_s:
-        return segments, ()
-    unit = min(UNITS_S, key=lambda name: abs(np.log(max(last * UNITS_S[name], 1e-12) / duration_s)))
-    seconds = [(label, start * UNITS_S[unit], end * UNITS_S[unit]) for label, start, end in segments]
-    return seconds, (f"its times go up to {last:.0f}: they were taken as {unit}",)
-
-
-def _line_segments(path: Path) -> tuple[list[Segment], str]:
-    """The segments of a file of lines, and its encoding where that had to be guessed."""
-    segments: list[Segment] = []
-    text, encoding = _text_of(path)
-    for number, line in _lines(text):
-        before_s = segments[-1][2] if segments else 0.0
-        try:
-            *times, label = _without_score(line.split())
-            start_s, end_s = (before_s, *map(float, times))[-2:]
-            if len(times) not in (1, 2) or not end_s > start_s >= before_s - 1e-6:
-                raise ValueError
-        except ValueError:
-            raise FacesynthError(
-                f"{path}, line {number}: {line!r} is not `end label` or `start end label`"
-                f" with times that go on from {before_s:g} s"
-            ) from None
-        segments.append((label, start_s, end_s))
-    return segments, encoding
-
-
-def _without_score(cells: list[str]) -> list[str]:
-    """A line without what HTK writes after a label: how likely it was."""
-    return cells[:3] if len(cells) == 4 and _NUMBER.fullmatch(cells[3]) and not _NUMBER.fullmatch(cells[2]) else cells
+    track, unread = _track(path, kept, None)
+    return Labelled(track, (), (*told, *counted, *_moved(begin_s), *mended, *labels, *unread))
 
 
 # A stretch that was cut out of a longer file may keep its times there: then it is as long as the sound, but does not lie in it.
@@ -214,22 +169,3 @@ def _number(seconds: float) -> str:
 def is_silence_mark(word: str) -> bool:
     """Whether an aligner's word stands for none: `sil`, `sp`, empty and the like."""
     return word.strip().lower() in {"", "sp", "sil", "<sil>", "<eps>", "spn", "<unk>", "h#", "<p:>", "#", SILENCE}
-
-
-def _text_of(path: Path) -> tuple[str, str]:
-    if not path.is_file():
-        raise FacesynthError(f"{path}: no such file of phones")
-    try:
-        return decoded(path.read_bytes())
-    except UnicodeDecodeError:
-        raise FacesynthError(f"{path} is not text in UTF-8; expected lines of `end label`") from None
-
-
-def _lines(text: str) -> Iterable[tuple[int, str]]:
-    """Number and text of each line that says something; of files of xwaves (header, `#`, `end colour label`) end and label."""
-    stripped = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
-    head = next((k for k, (_, line) in enumerate(stripped) if line == "#"), -1)
-    said = [(number, line) for number, line in stripped[head + 1 :] if line and not line.startswith("#")]
-    if head < 0 or not any(_NUMBER.fullmatch(line.split()[1]) for _, line in said if len(line.split()) == 3):
-        return said
-    return [(number, f"{line.split()[0]} {line.split()[-1]}") for number, line in said]

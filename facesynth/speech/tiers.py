@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from facesynth.inference.errors import FacesynthError, unknown
-from facesynth.speech.phone_labels import QUIET
+from facesynth.speech.phone_labels import QUIET, Notation, normalise_phone, notation_of
 from facesynth.speech.praat import Grid, Tier
 from facesynth.speech.segments import Segment
 
@@ -22,6 +22,10 @@ LARGEST_OVERLAP_S = 0.01
 """Neighbours that overlap by more were not meant to touch."""
 TOLD_S = 1e-9
 """Below this an overlap is the rounding of the last digit."""
+
+
+SHARE_OF_PHONES = 0.8
+"""A tier without a name that says so holds phones if as many of its different labels are such."""
 
 
 class SpeakerTiers(NamedTuple):
@@ -40,7 +44,12 @@ def tiers_of(grid: Grid, path: Path, speaker: str | None) -> SpeakerTiers:
 
     FacesynthError where there are no phones, or those of several speakers of which none was chosen.
     """
-    spoken = _by_speaker(grid.tiers, _PHONES)
+    spoken = _without_empty(_by_speaker(grid.tiers, _PHONES))
+    by_labels = None if spoken else _by_labels(grid.tiers)
+    if by_labels:
+        words = next((tier for tier in grid.tiers if tier is not by_labels and _WORDS.search(tier.name.lower())), None)
+        name = repr(by_labels.name) if by_labels.name else "the one without a name"
+        return SpeakerTiers(by_labels, words, None, (f"no tier is called phones; {name} is taken for them by its labels",))
     if not spoken:
         points = [tier.name for tier in grid.tiers if tier.of_points and _PHONES.search(tier.name.lower())]
         names = ", ".join(tier.name for tier in grid.tiers) or "none"
@@ -50,6 +59,31 @@ def tiers_of(grid: Grid, path: Path, speaker: str | None) -> SpeakerTiers:
     words, confidences = _by_speaker(grid.tiers, _WORDS), _by_speaker(grid.tiers, _CONFIDENCES)
     alone = next(iter(words.values())) if len(words) == 1 and len(spoken) == 1 else None
     return SpeakerTiers(spoken[whose], words.get(whose, alone), confidences.get(whose), remarks)
+
+
+def _without_empty(spoken: dict[str, Tier]) -> dict[str, Tier]:
+    """Tiers of phones without that of no speaker, where nothing stands in it and speakers have theirs."""
+    empty = "" in spoken and len(spoken) > 1 and not any(label.strip() for label, _, _ in spoken[""].intervals)
+    return {name: tier for name, tier in spoken.items() if name or not empty}
+
+
+def _by_labels(tiers: Sequence[Tier]) -> Tier | None:
+    """The tier of the most intervals, where nearly all of its labels are phones and others than those of words."""
+    full = [(sum(bool(label.strip()) for label, _, _ in tier.intervals), tier) for tier in tiers if not tier.of_points]
+    most = max((count for count, _ in full), default=0)
+    longest = [tier for count, tier in full if count == most]
+    if len(longest) != 1 or _WORDS.search(longest[0].name.lower()):
+        return None
+    labels = {label.strip() for label, _, _ in longest[0].intervals} - {""}
+    known = [label for label in labels if _is_phone(label, notation_of(labels))]
+    return longest[0] if len(labels) > 2 and len(known) >= SHARE_OF_PHONES * len(labels) else None
+
+
+def _is_phone(label: str, notation: Notation) -> bool:
+    try:
+        return bool(normalise_phone(label, notation))
+    except FacesynthError:
+        return False
 
 
 def _by_speaker(tiers: Sequence[Tier], kind: re.Pattern[str]) -> dict[str, Tier]:
@@ -98,6 +132,13 @@ def following(segments: Sequence[Segment]) -> tuple[list[Segment], tuple[str, ..
     """
     empty = [segment for segment in segments if abs(segment[2] - segment[1]) <= NO_LENGTH_S]
     kept = [segment for segment in segments if abs(segment[2] - segment[1]) > NO_LENGTH_S]
+    starts_s = [start_s for _, start_s, _ in kept]
+    if starts_s != sorted(starts_s):
+        kept.sort(key=lambda segment: segment[1])
+    gone = sum(end_s <= 0 for _, _, end_s in kept)
+    early_s = min((start_s for _, start_s, _ in kept), default=0.0)
+    if early_s < -NO_LENGTH_S:
+        kept = [(label, max(start_s, 0.0), end_s) for label, start_s, end_s in kept if end_s > 0]
     overlaps_s = []
     for number in range(1, len(kept)):
         (before, begin_s, stop_s), (label, start_s, end_s) = kept[number - 1 : number + 1]
@@ -108,6 +149,10 @@ def following(segments: Sequence[Segment]) -> tuple[list[Segment], tuple[str, ..
             overlaps_s.append(overlap_s)
     told_s = [overlap_s for overlap_s in overlaps_s if overlap_s > TOLD_S]
     remarks = []
+    if early_s < -NO_LENGTH_S:
+        remarks.append(f"its times begin at {early_s:g} s; what lies before 0 ({gone} whole intervals) was left out")
+    if starts_s != sorted(starts_s):
+        remarks.append("its intervals are not in the order of their times; they were put into it")
     if empty:
         names = ", ".join(dict.fromkeys(label or "without a label" for label, _, _ in empty))
         remarks.append(f"{len(empty)} intervals of no length were left out ({names})")

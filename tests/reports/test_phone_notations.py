@@ -196,7 +196,7 @@ def test_labels_that_others_share_are_of_no_such_set(labels, notation):
 @pytest.mark.parametrize(
     ("label", "notation", "phone"),
     [
-        ("a_~", "x_sampa", "aa"), ("E~_o", "x_sampa", "eh"), ("aan", "arpabet", "aa"), ("own", "arpabet", "ow"), 
+        ("a_~", "x_sampa", "aa"), ("E~_o", "x_sampa", "eh"), ("aan", "arpabet", "aa"), ("own", "arpabet", "ow"),
         ("r̝̊", "ipa", "zh"), ("ř", "ipa", "zh"),
         ("a_E", "ipa", "aa"), ("NSN_S", "arpabet", "pau"), ("<EXCLUDE-name>", "arpabet", "pau"),
         ("IVER", "arpabet", "pau"), ("silE", "ipa", "pau"), ("_:", "x_sampa", "pau"), (",", "ipa", "pau"), ("#0", "ipa", "pau"),

@@ -141,3 +141,58 @@ def test_a_grid_without_tiers_and_what_is_none(tmp_path):
         read_labelled(empty)
     with pytest.raises(FacesynthError, match="not a TextGrid"):
         read_labelled(put(tmp_path / "b.TextGrid", "hello\n"))
+
+
+def test_what_lies_before_0_is_left_out_and_another_order_is_mended_and_both_are_told(tmp_path, talker):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    tier = [("HH", -0.3, -0.1), ("sil", -0.1, 0.2), *[PHONES[k] for k in (2, 1, 4, 3)]]
+    path = put(tmp_path / "a.TextGrid", long_grid([("phones", tier)], -0.3))
+    found = read_labelled(path, 1.0)
+    assert found.phones.labels == ("pau", "aa", "p", "ae", "pau")
+    np.testing.assert_allclose(found.phones.ends_s, ENDS)
+    remarks = spoken(talker, sound, tmp_path, "--phones", path)[1]["remarks"]
+    assert any("begin at -0.3 s; what lies before 0 (1 whole intervals) was left out" in line for line in remarks)
+    assert any("not in the order of their times" in line for line in remarks)
+
+
+@pytest.mark.parametrize("name", ["Segmente", "fon", "IPA", "", "Mary"])
+def test_a_tier_of_phones_by_another_name_is_known_by_its_labels(tmp_path, name):
+    found = read_labelled(put(tmp_path / "a.TextGrid", short_grid([("Wort", [("up", 0.2, 0.9)]), (name, PHONES)])))
+    assert found.phones.labels == ("pau", "aa", "p", "ae", "pau")
+    assert any("no tier is called phones" in line for line in found.remarks)
+
+
+def test_words_alone_are_no_phones_and_an_empty_tier_gives_way_to_a_full_one(tmp_path):
+    words = [("the", 0.0, 0.3), ("boat", 0.3, 0.6), ("is", 0.6, 1.0)]
+    for name in ("Mary", "words", "utterances"):
+        with pytest.raises(FacesynthError, match="no tier of intervals named 'phones'"):
+            read_labelled(put(tmp_path / "a.TextGrid", long_grid([(name, words)])))
+    for empty in ([], [("", 0.0, 1.0)]):
+        found = read_labelled(put(tmp_path / "a.TextGrid", long_grid([("phones", empty), ("A - phones", PHONES)])))
+        assert found.phones.labels == ("pau", "aa", "p", "ae", "pau")
+
+
+LINES = {
+    "HTK with sp of no length": "0 2000000 sil\n2000000 5000000 AA1\n5000000 5000000 sp\n"
+    "5000000 7000000 P -3.5\n7000000 10000000 sil\n",
+    "overlaps of rounding": "0 0.2000001 sil\n0.2 0.5001 AA1\n0.5 0.7 P\n0.7 1.0 sil\n",
+    "decimal commas": "0,2 sil\n0,5 AA1\n0,7 P\n1,0 sil\n",
+    "a table": "start,end,phone\n0,0.2,sil\n0.2,0.5,AA1\n0.5,0.7,P\n0.7,1.0,sil\n",
+    "of the Montreal aligner": "Begin,End,Label,Type,Speaker\n0.2,0.7,op,words,A\n"
+    "0.2,0.5,AA1,phones,A\n0.5,0.7,P,phones,A\n0.7,1,sil,phones,A\n",
+    "of Praat": "tmin\ttier\ttext\ttmax\n0\tphones\tsil\t0.2\n0.2\tphones\tAA\t0.5\n0.5\tphones\tP\t0.7\n0.7\tphones\t\t1\n",
+    "a master label file": '#!MLF!#\n"*/b.lab"\n0 9 k\n.\n"*/a.lab"\n0 0.2 sil\n0.2 0.5 AA1\n0.5 0.7 P\n0.7 1.0 sil\n.\n',
+    "a label left out": "0 0.2\n0.2 0.5 AA1\n0.5 0.7 P\n0.7 1.0 \n",
+}
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_lines_of_labels_are_read_as_leniently(tmp_path, talker, kind):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    path = put(tmp_path / "a.lab", LINES[kind])
+    found = read_labelled(path, 1.0)
+    assert found.phones.labels == ("pau", "aa", "p", "pau")
+    np.testing.assert_allclose(found.phones.ends_s, [0.2, 0.5, 0.7, 1.0], atol=1e-3)
+    _, facts = spoken(talker, sound, tmp_path, "--phones", path)
+    assert any("of no length" in line for line in facts["remarks"]) == ("no length" in kind)
+    assert any("overlap" in line for line in facts["remarks"]) == ("overlaps" in kind)
