@@ -125,7 +125,8 @@ OF_ONE_RECORDING = ("text", "phones", "explain")
     "--mapping",
     type=FILE,
     help="YAML: which of the head's (or the model's) own channels follow which ARKit weights, or the name of a preset: "
-    "cc4, facs, metahuman, mmd, oculus, readyplayerme, vrm0, vrm1. NAME.yaml beside the head, or what fits best, otherwise.",
+    "cc3, cc4, daz, facs, meta, metahuman, mixamo, mmd, oculus, preston_blair, readyplayerme, rhubarb, sranipal, unified, vrm0, "
+    "vrm1. NAME.yaml beside the head, or what fits best, otherwise.",
 )
 @click.option(
     "--deform",

@@ -136,7 +136,7 @@ def test_own_curves_need_no_detour(head):
 
 def test_a_head_without_mapping_says_what_to_give(tmp_path):
     with pytest.raises(FacesynthError, match="give a mapping file"):
-        load_own_head(write_mask(tmp_path / "a.glb"))
+        load_own_head(write_mask(tmp_path / "a.glb", names=("One", "Two", "Three", "Four", "Five")))
     with pytest.raises(FacesynthError, match="is no head"):
         load_own_head(tmp_path / "a.fbx")
     assert load_own_head(write_mask(tmp_path / "b.glb", names=("jawOpen", "eyeBlink_L"))).map.idle == ()

@@ -142,3 +142,61 @@ def teeth_on_a_jaw(document, data):
         gl.Node(name="CC_Base_JawRoot", translation=[0.0, -1.0, -6.0], children=[first + 1]),
         gl.Node(name="Teeth", mesh=len(document.meshes) - 1, translation=[0.0, -3.0, 9.0]),
     ]
+
+
+def vrm0_mixing(document, _data):
+    """An avatar whose morph targets have names of their own, and whose expressions mix several."""
+    document.meshes[0].extras = {"targetNames": ["kuchi_tate", "kuchi_yoko", "kuchi_maru", "mabuta", "hoho"]}
+    mixed = {"a": [(0, 80), (1, 30)], "o": [(0, 40), (2, 100)], "blink": [(3, 100)]}
+    groups = [
+        {"name": name.upper(), "presetName": name, "binds": [{"mesh": 0, "index": k, "weight": share} for k, share in binds]}
+        for name, binds in mixed.items()
+    ]
+    document.extensions = {"VRM": {"blendShapeMaster": {"blendShapeGroups": groups}}}
+
+
+def vrm1_mixing(document, _data):
+    document.meshes[0].extras = {"targetNames": ["m1", "m2", "m3", "m4", "m5"]}
+    mixed = {"aa": [(0, 0.8), (1, 0.3)], "oh": [(0, 0.4), (2, 1.0)], "blink": [(3, 1.0)]}
+    preset = {
+        name: {"morphTargetBinds": [{"node": 2, "index": k, "weight": share} for k, share in binds]}
+        for name, binds in mixed.items()
+    }
+    document.extensions = {"VRMC_vrm": {"expressions": {"preset": preset}}}
+
+
+def mirrored(document, _data):
+    """A root that mirrors the head, as some exporters do."""
+    document.nodes[0].scale = [-(document.nodes[0].scale or [1, 1, 1])[0], *(document.nodes[0].scale or [1, 1, 1])[1:]]
+
+
+def in_another_scene(document, _data):
+    """A scene of a camera alone, which is the file's own, before that of the head."""
+    document.nodes.append(gl.Node(name="camera"))
+    document.scenes.insert(0, gl.Scene(nodes=[len(document.nodes) - 1]))
+    document.scene = 0
+
+
+def compressed(document, _data):
+    """Points that stand in Draco's extension alone, which the file only says it uses."""
+    primitive = document.meshes[0].primitives[0]
+    primitive.extensions = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    document.accessors[primitive.attributes.POSITION].bufferView = None
+    document.extensionsUsed = ["KHR_draco_mesh_compression"]
+
+
+def halves(where, shift=0.0):
+    """A texture that is red on its left and green on its right, in `where`; the face looks at its left, shifted."""
+
+    def change(document, data):
+        uv = np.full((len(mask()[0]), 2), (0.25, 0.5), "<f4")
+        document.meshes[0].primitives[0].attributes.TEXCOORD_0 = laid(document, data, uv)
+        picture = Image.new("RGB", (8, 8), (200, 0, 0))
+        picture.paste((0, 200, 0), (4, 0, 8, 8))
+        picture.save(where)
+        document.images = [gl.Image(uri=where.name.replace(" ", "%20"))]
+        document.textures = [gl.Texture(source=0)]
+        moved = {"KHR_texture_transform": {"offset": [shift, 0.0]}} if shift else {}
+        document.materials[0].pbrMetallicRoughness.baseColorTexture = gl.TextureInfo(index=0, extensions=moved)
+
+    return change

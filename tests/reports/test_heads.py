@@ -10,7 +10,11 @@ from grids import PHONES, long_grid, put
 from heads import (
     TALKING,
     as_strips,
+    compressed,
+    halves,
     head,
+    in_another_scene,
+    mirrored,
     names_in_accessors,
     names_in_node,
     names_in_primitive,
@@ -19,7 +23,9 @@ from heads import (
     teeth_on_a_jaw,
     textured,
     vrm0,
+    vrm0_mixing,
     vrm1,
+    vrm1_mixing,
 )
 
 from facesynth.face.rig.channel_map import arkit_name
@@ -64,6 +70,45 @@ def test_avatars_by_their_first_bytes(tmp_path, said):
         assert any(f"follow the preset {chosen}" in line for line in told)
     odd = head(tmp_path / "binary.gltf")
     assert load_own_head(odd).names == TALKING
+
+
+@pytest.mark.parametrize(("kind", "chosen"), [(vrm0_mixing, "vrm0"), (vrm1_mixing, "vrm1")])
+def test_expressions_that_mix_shapes_drive_them_by_their_shares(tmp_path, said, kind, chosen):
+    channels, told = said(head(tmp_path / "mixing.vrm", kind))
+    down, wide, around, *_ = channels.values()
+    assert down[OPENING].max() > 0.3
+    np.testing.assert_allclose(wide, 0.3 / 0.8 * down, atol=1e-5)
+    assert any(f"4 of its 5 channels follow the preset {chosen} through the avatar's expressions" in line for line in told)
+    way = load_own_head(tmp_path / "mixing.vrm").map.channels
+    assert way[0].shares["jawOpen"] == pytest.approx(0.8 * 1.4)
+    assert dict(way[2].shares) == pytest.approx({"mouthFunnel": 0.9})
+    assert around.min() >= 0
+
+
+def test_a_mirrored_head_is_not_inside_out(tmp_path):
+    plain, turned = load_own_head(head(tmp_path / "a.glb")), load_own_head(head(tmp_path / "b.glb", mirrored))
+
+    def facing(own):
+        a, b, c = (own.rest_mm[own.triangles[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)[:, 2].sum()
+
+    assert facing(turned) == pytest.approx(facing(plain), rel=0.01)
+
+
+def test_a_head_of_another_scene_is_shown_and_a_compressed_one_is_told_how_to_mend(tmp_path, said):
+    channels, _ = said(head(tmp_path / "second.glb", in_another_scene))
+    assert channels["jawOpen"].max() > 0.5
+    with pytest.raises(FacesynthError, match="compressed .KHR_draco_mesh_compression.; .*gltf-transform"):
+        load_own_head(head(tmp_path / "draco.glb", compressed))
+
+
+def test_pictures_beside_the_file_are_drawn_where_their_transform_puts_them_and_missing_ones_are_told(tmp_path, said):
+    skin = tmp_path / "the skin.png"
+    plain, moved = head(tmp_path / "a.glb", halves(skin)), head(tmp_path / "b.glb", halves(skin, shift=0.5))
+    assert load_own_head(plain).colours[0, 0, 0].argmax() == 0
+    assert load_own_head(moved).colours[0, 0, 0].argmax() == 1
+    skin.unlink()
+    assert any("textures that are missing" in line for line in said(plain)[1])
 
 
 def test_an_avatar_that_looks_backwards_is_turned_round(tmp_path, said):
@@ -164,6 +209,18 @@ def test_joints_that_cannot_be_turned_are_told(tmp_path, joint, said_of_it):
         ("facs", ("LipsFunnel", "LipsPucker", "AU26", "LipsUpperUp", "BrowsU_C")),
         ("metahuman", ("CTRL_expressions_jawOpen", "CTRL_expressions_mouthFunnelUL", "CTRL_expressions_mouthCornerPullL",
                        "CTRL_expressions_browRaiseInL", "CTRL_expressions_mouthLipsPurseUR")),
+        ("cc3", ("Mouth_Open", "Mouth_Pucker", "Mouth_Top_Lip_Up", "Mouth_Bottom_Lip_Down", "Explosive")),
+        ("daz", ("Genesis8Male__eCTRLMouthOpen", "Genesis8Male__eCTRLvOW", "Genesis8Male__eCTRLvF", "eCTRLEyesClosedL",
+                 "eCTRLvEH")),
+        ("daz", ("facs_bs_JawOpen", "facs_bs_MouthPurseUpperLeft", "facs_bs_MouthPurseUpperRight", "facs_bs_MouthFunnelLowerLeft",
+                 "facs_bs_MouthFunnelLowerRight")),
+        ("meta", ("jawDrop", "lipFunnelerLB", "lipPuckerR", "lipCornerPullerL", "eyesClosedR")),
+        ("mixamo", ("Facial_Blends.MouthOpen", "Facial_Blends.MouthNarrow_Left", "Facial_Blends.Smile_Right",
+                    "Facial_Blends.Blink_Left", "Facial_Blends.UpperLipUp_Left")),
+        ("unified", ("JawOpen", "LipFunnelUpperLeft", "LipPuckerLowerRight", "MouthClosed", "MouthCornerPullLeft")),
+        ("sranipal", ("Jaw_Open", "Mouth_Ape_Shape", "Mouth_Pout", "Mouth_Upper_Overturn", "Mouth_Sad_Left")),
+        ("preston_blair", ("MouthAI", "MouthO", "MouthMBP", "MouthFV", "MouthL")),
+        ("rhubarb", ("mouth_A", "mouth_D", "mouth_E", "mouth_F", "mouth_G")),
     ],
 )  # fmt: skip
 def test_a_preset_is_chosen_where_it_fits_best_and_told(tmp_path, said, preset, names):
@@ -187,6 +244,10 @@ def test_a_preset_is_chosen_where_it_fits_best_and_told(tmp_path, said, preset, 
         ("blendShape1.mouthFunnel", "mouthFunnel"), ("MOUTH_PUCKER", "mouthPucker"),
         ("JawOpen_1", "jawOpen"), ("jaw_open_blendshape", "jawOpen"), ("jawOpenBlendShape", "jawOpen"),
         ("eyeBlink_L_2", "eyeBlinkLeft"), ("mouth_smile_right_shape", "mouthSmileRight"),
+        ("L_eyeBlink", "eyeBlinkLeft"), ("rightMouthSmile", "mouthSmileRight"), ("left_brow_down", "browDownLeft"),
+        ("Head:R_mouthFrown", "mouthFrownRight"), ("headJawOpen", "jawOpen"), ("jawOpen_Teeth", "jawOpen"),
+        ("facs_bs_MouthFunnel_div2", "mouthFunnel"), ("browInnerUp_L", "browInnerUp"), ("cheekPuffRight", "cheekPuff"),
+        ("jawLeft", "jawLeft"), ("Mouth_Right", "mouthRight"), ("leftover", None),
         ("AU25_r", None), ("Frozen", None), ("mouthOpen", None),
     ],
 )  # fmt: skip
@@ -208,6 +269,12 @@ def test_the_end_of_an_action_unit_is_a_side_only_beside_the_other_side():
 def test_visemes_of_character_creator_do_not_move_a_mouth_that_others_move():
     names = ("Jaw_Open", "Mouth_Close", "Mouth_Funnel_Up_L", "Mouth_Funnel_Up_R", "V_Open", "V_Explosive", "V_Tight_O", "V_Wide")
     assert {name for name in preset("cc4", names).channels if name.startswith("V_")} == {"V_Wide"}
+
+
+def test_visemes_beside_shapes_that_move_the_same_do_not_move_it_twice():
+    for name, channels in (("daz", ("eCTRLMouthOpen", "eCTRLvAA", "eCTRLvOW")), ("cc3", ("Mouth_Open", "Open", "Dental_Lip"))):
+        assert channels[1] not in preset(name, channels).channels
+        assert channels[2] in preset(name, channels).channels
 
 
 def test_a_head_with_all_of_arkit_needs_no_preset():
@@ -260,7 +327,7 @@ def test_every_preset_says_where_its_names_are_from():
 @pytest.mark.parametrize("trials", [60, pytest.param(2000, marks=pytest.mark.slow)])
 def test_heads_with_one_field_changed_are_right_or_one_clear_line(tmp_path, trials):
     """A valid head of each kind, then one value of its document replaced by another."""
-    kinds = (None, vrm0, vrm1, names_in_primitive, as_strips, textured("webp"), outside)
+    kinds = (None, vrm0, vrm1, vrm0_mixing, vrm1_mixing, names_in_primitive, as_strips, textured("webp"), outside)
     wholes = [head(tmp_path / "whole.glb", kind).read_bytes() for kind in kinds]
     wrong = [None, -1, 0, 1, 7, 2**31, 1e30, "x", "", [], {}, [0], [-1, 99], True, {"name": 3}, [None], "SCALAR", 5121]
     rng, read = np.random.default_rng(8), 0

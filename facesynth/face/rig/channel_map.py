@@ -12,8 +12,12 @@ from facesynth.face.animation import FaceAnimation
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
-_SIDES = {"l": "Left", "r": "Right"}
-_ENDINGS = re.compile(r"(?:[_ .-](?:blend_?shapes?|shapes?|morphs?|targets?|\d{1,2})|blendshape)+$", re.IGNORECASE)
+_SIDES = {"l": "Left", "r": "Right", "left": "Left", "right": "Right"}
+_SIDE_FIRST = re.compile(r"^(?:([LR])[_ .-]|(left|right)[_ .-]?)(?=[A-Za-z])", re.IGNORECASE)
+_PART_FIRST = re.compile(r"^(?:head|face|body|mesh|geo)(?=[A-Z])")
+_ENDINGS = re.compile(
+    r"(?:[_ .-](?:blend_?shapes?|shapes?|morphs?|targets?|div\d|head|face|teeth|mesh|geo|\d{1,2})|blendshape)+$", re.IGNORECASE
+)
 RIDGE = 1e-4
 """Price of a weight where own channels are turned into ARKit's: it decides only what they leave open."""
 
@@ -133,7 +137,13 @@ def _bounded(basis: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray
 
 def arkit_name(name: str) -> str | None:
     """The ARKit name that a name means, whatever its case, its prefixes and its way to tell the sides apart."""
-    return next((_FOLDED[plain] for plain in folded_names(name) if plain in _FOLDED), None)
+    plain = list(folded_names(name))
+    return next((_FOLDED[one] for one in (*plain, *map(_both_sides, plain)) if one in _FOLDED), None)
+
+
+def _both_sides(plain: str) -> str:
+    """A name without its side, where ARKit has one weight for both: `browInnerUp_L`, `cheekPuffRight`."""
+    return re.sub(r"(?:left|right)$", "", plain)
 
 
 def folded_names(name: str) -> Iterator[str]:
@@ -144,7 +154,15 @@ def folded_names(name: str) -> Iterator[str]:
     and `_c` of OpenFace's action units, which are intensity and presence, no sides.
     """
     whole = re.sub(r"\.\d{3}$", "", normalize("NFKC", name).strip())
-    yield from dict.fromkeys(plain for text in (whole, _ENDINGS.sub("", whole)) for plain in _without_starts(_sided(text)))
+    texts = (whole, _ENDINGS.sub("", whole), _side_last(whole), _PART_FIRST.sub("", whole))
+    yield from dict.fromkeys(plain for text in texts for plain in _without_starts(_sided(text)))
+
+
+def _side_last(text: str) -> str:
+    """`L_eyeBlink` and `leftEyeBlink` as eyeBlinkLeft; behind a mesh's name as well."""
+    *before, last = re.split(r"(?<=[.:|/])|(?<=__)", text)
+    found = _SIDE_FIRST.match(last)
+    return "".join(before) + (last[found.end() :] + _SIDES[(found[1] or found[2]).lower()] if found else last)
 
 
 def _sided(text: str) -> str:

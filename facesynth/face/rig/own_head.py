@@ -1,7 +1,7 @@
 """A head of somebody's own: triangles with morph targets under its own names, read from glTF or from OBJ files."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.files.gltf.scene import Part, Scene, read_scene
-from facesynth.face.rig.channel_map import ChannelMap
+from facesynth.face.rig.channel_map import ChannelMap, arkit_name
 from facesynth.face.rig.mapping_file import HeadMapping
 from facesynth.face.rig.obj import read_shapes
-from facesynth.face.rig.presets import asked_for, fitting
+from facesynth.face.rig.presets import asked_for, by_expressions, fitting
 from facesynth.inference.errors import FacesynthError, unknown
 
 TEXELS = 5
@@ -129,19 +129,25 @@ def load_own_head(path: str | Path, mapping: str | Path | None = None, *, needs_
     return _from_scene(path, read_scene(path, TEXELS), found, needs_arkit)
 
 
-def _mapping(found: Path | None, names: Sequence[str]) -> tuple[HeadMapping, tuple[str, ...]]:
+def _mapping(
+    found: Path | None, names: Sequence[str], expressions: Mapping[str, Mapping[str, float]]
+) -> tuple[HeadMapping, tuple[str, ...]]:
     """What is said of channels of these names, and by whom, where nobody asked for that."""
     if found is not None:
         return asked_for(found, names), ()
     name, channels = fitting(names)
     moved = sum(bool(channel.shares) for channel in channels.values())
+    avatar, through = by_expressions(expressions)
+    if len(through) > max(moved, sum(arkit_name(channel) is not None for channel in names)):
+        told = f"{len(through)} of its {len(names)} channels follow the preset {avatar} through the avatar's expressions"
+        return HeadMapping(through), (f"{told}; --mapping takes another, or a file of your own",)
     said = f"{moved} of its {len(names)} channels follow the preset {name}; --mapping takes another, or a file of your own"
     return HeadMapping(channels), (said,) if name else ()
 
 
 def _from_scene(path: Path, scene: Scene, found: Path | None, needs_arkit: bool) -> OwnHead:
     names = tuple(dict.fromkeys(name for part in scene.parts for name in part.targets))
-    told, assumed = _mapping(found, names)
+    told, assumed = _mapping(found, names, scene.expressions)
     turned = [name for name, channel in told.channels.items() if channel.turn_deg is not None]
     names += tuple(name for name in turned if name not in names)
     vertices = np.concatenate([part.vertices for part in scene.parts])
@@ -199,7 +205,7 @@ def _hanging(scene: Scene, joints: Sequence[Joint]) -> Iterator[str]:
 
 def _from_obj(folder: Path, found: Path | None, needs_arkit: bool) -> OwnHead:
     names, neutral, moved, triangles = read_shapes(folder)
-    told, assumed = _mapping(found, names)
+    told, assumed = _mapping(found, names, {})
     colours = np.full((len(triangles), TEXELS, TEXELS, 3), 0.45)
     arrays = (neutral, moved.astype(np.float32), triangles, colours, np.ones(len(neutral)))
     channel_map = ChannelMap.of(names, told.channels, needs_arkit=needs_arkit)

@@ -10,12 +10,15 @@ from facesynth.face.rig.channel_map import Channel, arkit_name, folded_names
 from facesynth.face.rig.mapping_file import HeadMapping, read_mapping
 from facesynth.inference.errors import unknown
 
-PRESETS = ("cc4", "facs", "metahuman", "vrm1", "vrm0", "readyplayerme", "oculus", "mmd")
+PRESETS = (
+    *("cc4", "facs", "metahuman", "unified", "meta", "sranipal", "daz", "vrm1", "vrm0", "readyplayerme", "oculus", "mmd"),
+    *("mixamo", "cc3", "preston_blair", "rhubarb"),
+)
 """Where two fit as well, the first is taken."""
 ENOUGH = 15
 """A head with so many of ARKit's names is driven by those; visemes that it has beside them would move the mouth twice."""
-_VISEME = re.compile(r"(?:^|[_:|./ -])V_[A-Z]")
-"""Visemes of Character Creator."""
+_VISEME = re.compile(r"(?:^|[_:|./ -])V_[A-Z]|eCTRLv[A-Z]|(?:^|[:|./])(?:Open|Explosive|Dental_Lip|Tight.O|Affricate)$")
+"""Visemes of Character Creator 4, of DAZ Studio and of Character Creator 3."""
 _LEFT_UNIT = re.compile(r"AU\d{1,2}_[lL]$")
 """Beside it `AU12_r` is the right side, and not OpenFace's intensity of both."""
 JAW = "jawOpen"
@@ -59,6 +62,28 @@ def fitting(channels: Sequence[str]) -> tuple[str, Mapping[str, Channel]]:
     alone = not by_name and sum(len(channel) > LETTERS for channel in _moved(ways[best])) >= FEWEST_ALONE
     fits = alone or added >= FEWEST or 2 * added >= len(channels) > 0
     return (best, ways[best]) if fits else ("", {})
+
+
+def by_expressions(expressions: Mapping[str, Mapping[str, float]]) -> tuple[str, Mapping[str, Channel]]:
+    """The preset of VRM that drives most of an avatar's channels by the expressions that they make up, and how; an empty name
+    where it has none. expressions: the share of each channel in each.
+    """
+    ways = {name: _through(_matched(name, tuple(expressions)), expressions) for name in ("vrm1", "vrm0")}
+    best = max(ways, key=lambda name: len(ways[name]))
+    return (best, ways[best]) if ways[best] else ("", {})
+
+
+def _through(ways: Mapping[str, Channel], expressions: Mapping[str, Mapping[str, float]]) -> dict[str, Channel]:
+    """How channels follow weights by the expressions that they are part of."""
+    shares: dict[str, dict[str, float]] = {}
+    most: dict[str, float] = {}
+    for expression, way in ways.items():
+        for channel, part in expressions[expression].items():
+            taken = shares.setdefault(channel, {})
+            most[channel] = min(most.get(channel, 0.0) + part, 1.0)
+            for weight, share in way.shares.items():
+                taken[weight] = taken.get(weight, 0.0) + part * share
+    return {channel: Channel(taken, high=most[channel]) for channel, taken in shares.items() if taken}
 
 
 def _moved(ways: Mapping[str, Channel]) -> set[str]:

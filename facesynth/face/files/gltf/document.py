@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pygltflib as gl
@@ -28,9 +29,21 @@ def read_document(path: Path) -> gl.GLTF2:
     if document is None or not document.meshes or not document.nodes:
         raise FacesynthError(f"{path} holds no mesh; export the head as .glb, with its shape keys")
     for extension in _COMPRESSED:
-        if extension in (document.extensionsRequired or []):
-            raise FacesynthError(f"{path} is compressed ({extension}); export it without compression")
+        if extension in (document.extensionsRequired or []) or _stand_only_in(extension, document):
+            raise FacesynthError(
+                f"{path} is compressed ({extension}); export it without compression, or take that off:"
+                " npx @gltf-transform/cli copy compressed.glb plain.glb"
+            )
     return document
+
+
+def _stand_only_in(extension: str, document: gl.GLTF2) -> bool:
+    """Whether points of a mesh stand in an extension alone, although the file does not require it."""
+    primitives = [
+        primitive for mesh in document.meshes for primitive in mesh.primitives if extension in (primitive.extensions or {})
+    ]
+    places = [primitive.attributes.POSITION for primitive in primitives]
+    return any(isinstance(k, int) and document.accessors[k].bufferView is None for k in places)
 
 
 def is_binary(path: Path) -> bool:
@@ -100,8 +113,9 @@ class Buffers:
 
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2])
-        beside = self.path.parent / Path(uri).name
-        if Path(uri).name != uri or not beside.is_file():
+        name = Path(unquote(uri))
+        beside = self.path.parent / name
+        if not name.name or name.is_absolute() or ".." in name.parts or not beside.is_file():
             raise FacesynthError(f"{self.path} needs {uri!r} beside it; export everything into one .glb")
         return beside.read_bytes()
 

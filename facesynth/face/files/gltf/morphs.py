@@ -62,17 +62,35 @@ def _get(target: Any, key: str) -> Any:
     return target.get(key) if isinstance(target, dict) else getattr(target, key, None)
 
 
+def expressions(document: gl.GLTF2) -> dict[str, dict[str, float]]:
+    """What a VRM avatar's expressions consist of: by their name, the share of each morph target by its name."""
+    names = {mesh: target_names(document, mesh) for mesh in range(len(document.meshes))}
+    found: dict[str, dict[str, float]] = {}
+    for name, binds in _binds(document):
+        shares = {names[mesh][index]: weight for mesh, index, weight in binds if 0 <= index < len(names.get(mesh, ()))}
+        found.setdefault(name, {}).update(shares)
+    return found
+
+
 def _expressions(document: gl.GLTF2, mesh: int) -> Iterator[tuple[int, str]]:
     """Number of a target and the expression of a VRM avatar (0.x, then 1.0) that consists of it alone."""
+    yield from ((binds[0][1], name) for name, binds in _binds(document) if len(binds) == 1 and binds[0][0] == mesh)
+
+
+def _binds(document: gl.GLTF2) -> Iterator[tuple[str, list[tuple[int, int, float]]]]:
+    """Each expression's name with mesh, number and share (0 to 1) of the targets that it consists of."""
     extensions = document.extensions or {}
     for group in (extensions.get("VRM") or {}).get("blendShapeMaster", {}).get("blendShapeGroups", []):
-        binds = group.get("binds") or []
-        if len(binds) == 1 and binds[0].get("mesh") == mesh:
-            preset = str(group.get("presetName") or "")
-            yield int(binds[0]["index"]), str(group.get("name") or "") if preset in ("", "unknown") else preset
-    expressions = (extensions.get("VRMC_vrm") or {}).get("expressions", {})
+        preset = str(group.get("presetName") or "")
+        binds = [
+            (bind.get("mesh"), int(bind["index"]), float(bind.get("weight", 100)) / 100) for bind in group.get("binds") or []
+        ]
+        yield str(group.get("name") or "") if preset in ("", "unknown") else preset, binds
+    given = (extensions.get("VRMC_vrm") or {}).get("expressions", {})
     for kind in ("custom", "preset"):
-        for name, expression in (expressions.get(kind) or {}).items():
-            binds = expression.get("morphTargetBinds") or []
-            if len(binds) == 1 and document.nodes[binds[0]["node"]].mesh == mesh:
-                yield int(binds[0]["index"]), str(name)
+        for name, expression in (given.get(kind) or {}).items():
+            morphs = expression.get("morphTargetBinds") or []
+            yield (
+                str(name),
+                [(document.nodes[one["node"]].mesh, int(one["index"]), float(one.get("weight", 1.0))) for one in morphs],
+            )

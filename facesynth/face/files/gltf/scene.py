@@ -1,8 +1,10 @@
 """What a glTF file shows at rest: meshes with morph targets where their nodes put them, and the colour of their skin."""
 
 import io
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygltflib as gl
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.files.gltf.document import Buffers, in_one_line, read_document
-from facesynth.face.files.gltf.morphs import names_twice, target_names
+from facesynth.face.files.gltf.morphs import expressions, names_twice, target_names
 from facesynth.inference.errors import FacesynthError
 
 MODES = (None, gl.TRIANGLES, gl.TRIANGLE_STRIP, gl.TRIANGLE_FAN)
@@ -54,6 +56,8 @@ class Scene:
     """The node that the file itself says is the head."""
     remarks: tuple[str, ...] = ()
     """What is drawn otherwise than the file says, for a person."""
+    expressions: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Of an avatar: the share of each morph target in each of its expressions, by name."""
 
     def below(self, node: int) -> NDArray[np.int64]:
         """The node and all nodes under it."""
@@ -97,14 +101,22 @@ def _scene(document: gl.GLTF2, buffers: Buffers, texels: int) -> Scene:
     ]
     if not parts:
         raise FacesynthError(f"{buffers.path} shows no triangles; export the head as a mesh")
-    return Scene(tuple(parts), names, tuple(parents), places, root, _head(document), _remarks(document, shown))
+    remarks = _remarks(document, buffers, shown)
+    return Scene(tuple(parts), names, tuple(parents), places, root, _head(document), remarks, expressions(document))
 
 
 def _shown(document: gl.GLTF2) -> set[int]:
-    """The nodes of the scene that is shown; all of them where the file has none."""
+    """The nodes of the scene that is shown, or of the first that shows a mesh; all of them where there is none."""
     if not document.scenes:
         return set(range(len(document.nodes)))
-    found, waiting = set[int](), list(document.scenes[document.scene or 0].nodes or [])
+    first = document.scene or 0
+    reached = (_reached(document, document.scenes[number].nodes or []) for number in (first, *range(len(document.scenes))))
+    shown = next((nodes for nodes in reached if any(document.nodes[node].mesh is not None for node in nodes)), None)
+    return set(range(len(document.nodes))) if shown is None else shown
+
+
+def _reached(document: gl.GLTF2, roots: Sequence[int]) -> set[int]:
+    found, waiting = set[int](), list(roots)
     while waiting:
         node = waiting.pop()
         if node not in found:
@@ -123,7 +135,7 @@ def _head(document: gl.GLTF2) -> int | None:
     return node if isinstance(node, int) and 0 <= node < len(document.nodes) else None
 
 
-def _remarks(document: gl.GLTF2, shown: set[int]) -> tuple[str, ...]:
+def _remarks(document: gl.GLTF2, buffers: Buffers, shown: set[int]) -> tuple[str, ...]:
     """What of a file is drawn otherwise than it says, or not at all."""
     hidden = [node.name or f"node {k}" for k, node in enumerate(document.nodes) if node.mesh is not None and k not in shown]
     twice = [name for mesh in range(len(document.meshes)) for name in names_twice(document, mesh)]
@@ -132,15 +144,13 @@ def _remarks(document: gl.GLTF2, shown: set[int]) -> tuple[str, ...]:
         remarks.append(f"{', '.join(hidden[:4])} stand outside of the scene and are not drawn")
     if twice:
         remarks.append(f"several shapes are called {', '.join(dict.fromkeys(twice))}; the first of each is used")
-    if any(_is_strange(document, number) for number in range(len(document.textures or []))):
-        remarks.append("textures of a kind that is not read (such as KTX2) are drawn in the materials' base colours")
+    surfaces = [surface for material in document.materials or [] if (surface := material.pbrMetallicRoughness) is not None]
+    used = {surface.baseColorTexture.index for surface in surfaces if surface.baseColorTexture is not None}
+    if any(_picture(document, buffers, number) is None for number in sorted(used)):
+        remarks.append(
+            "textures that are missing or of a kind that is not read (such as KTX2) are drawn in the materials' base colours"
+        )
     return tuple(remarks)
-
-
-def _is_strange(document: gl.GLTF2, texture: int) -> bool:
-    """Whether a texture's picture is of a kind that is not known."""
-    image = _image(document, texture)
-    return image is None or (image.mimeType or "") == "image/ktx2" or (image.uri or "").lower().endswith(".ktx2")
 
 
 def _image(document: gl.GLTF2, texture: int) -> gl.Image | None:
@@ -196,6 +206,8 @@ def _part(
     if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= len(vertices):
         raise FacesynthError(f"{buffers.path}: a triangle names a vertex that does not exist; export it again")
     follows, turns = _follows(document, buffers, index, primitive, places, len(vertices))
+    if np.linalg.det(turns[0, :3, :3]) < 0:
+        triangles = triangles[:, ::-1]  # a mirrored node turns its triangles inside out
     world = np.einsum("vij,vj->vi", turns[:, :3, :3], vertices) + turns[:, :3, 3]
     targets = {
         name: np.einsum("vij,vj->vi", turns[:, :3, :3], moved)
@@ -250,23 +262,31 @@ def _patch_places(texels: int) -> NDArray[np.float64]:
 def _colours(
     document: gl.GLTF2, buffers: Buffers, primitive: gl.Primitive, triangles: NDArray[np.int64], texels: int
 ) -> NDArray[np.float64]:
-    factor, picture, channel = np.array([0.6, 0.6, 0.6]), None, 0
+    factor, picture, channel, moved = np.array([0.6, 0.6, 0.6]), None, 0, {}
     if primitive.material is not None:
         surface = document.materials[primitive.material].pbrMetallicRoughness
         if surface is not None:
             factor = np.asarray(surface.baseColorFactor or [1, 1, 1, 1], np.float64)[:3]
             if surface.baseColorTexture is not None:
                 picture = _picture(document, buffers, surface.baseColorTexture.index)
-                channel = surface.baseColorTexture.texCoord or 0
+                moved = (surface.baseColorTexture.extensions or {}).get("KHR_texture_transform") or {}
+                channel = moved.get("texCoord", surface.baseColorTexture.texCoord) or 0
     flat = np.broadcast_to(factor, (len(triangles), texels, texels, 3))
     at = getattr(primitive.attributes, f"TEXCOORD_{channel}", None)
     if picture is None or at is None:
         return np.array(flat)
-    uv = np.einsum("pqc,fcd->fpqd", _patch_places(texels), buffers.array(at)[triangles])
+    uv = np.einsum("pqc,fcd->fpqd", _patch_places(texels), _moved_uv(buffers.array(at), moved)[triangles])
     height, width = picture.shape[:2]
     column = np.floor(uv[..., 0] % 1.0 * width).astype(np.int64).clip(0, width - 1)
     row = np.floor(uv[..., 1] % 1.0 * height).astype(np.int64).clip(0, height - 1)
     return flat * (picture[row, column] / 255.0) ** 2.2
+
+
+def _moved_uv(uv: NDArray[np.float64], moved: Mapping[str, Any]) -> NDArray[np.float64]:
+    """[V, 2] places in a picture after KHR_texture_transform: scaled, turned, shifted."""
+    angle = float(moved.get("rotation", 0.0))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return uv * np.asarray(moved.get("scale", (1, 1)), np.float64) @ turn.T + np.asarray(moved.get("offset", (0, 0)), np.float64)
 
 
 def _is_gauze(document: gl.GLTF2, primitive: gl.Primitive) -> bool:
@@ -278,15 +298,16 @@ def _is_gauze(document: gl.GLTF2, primitive: gl.Primitive) -> bool:
 
 
 def _picture(document: gl.GLTF2, buffers: Buffers, texture: int) -> NDArray[np.uint8] | None:
-    """[H, W, 3] a picture inside the file; None for one that is elsewhere or of a kind that is not known."""
+    """[H, W, 3] a picture inside the file or beside it; None for one that is not there or of a kind that is not known."""
     from PIL import Image
 
     image = _image(document, texture)
     if image is None:
         return None
-    if image.bufferView is None and not (image.uri or "").startswith("data:"):
+    try:
+        content = buffers.bytes_of(image.bufferView) if image.bufferView is not None else buffers.from_uri(image.uri or "")
+    except FacesynthError:
         return None
-    content = buffers.bytes_of(image.bufferView) if image.bufferView is not None else buffers.from_uri(image.uri)
     try:
         with Image.open(io.BytesIO(content)) as opened:
             opened.thumbnail((4096, 4096))
