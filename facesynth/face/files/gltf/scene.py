@@ -262,7 +262,8 @@ def _patch_places(texels: int) -> NDArray[np.float64]:
 def _colours(
     document: gl.GLTF2, buffers: Buffers, primitive: gl.Primitive, triangles: NDArray[np.int64], texels: int
 ) -> NDArray[np.float64]:
-    factor, picture, channel, moved = np.array([0.6, 0.6, 0.6]), None, 0, {}
+    factor, picture, channel = np.array([0.6, 0.6, 0.6]), None, 0
+    moved: Mapping[str, Any] = {}
     if primitive.material is not None:
         surface = document.materials[primitive.material].pbrMetallicRoughness
         if surface is not None:
@@ -275,7 +276,8 @@ def _colours(
     at = getattr(primitive.attributes, f"TEXCOORD_{channel}", None)
     if picture is None or at is None:
         return np.array(flat)
-    uv = np.einsum("pqc,fcd->fpqd", _patch_places(texels), _moved_uv(buffers.array(at), moved)[triangles])
+    places = _moved_uv(buffers.array(at), moved)
+    uv = np.einsum("pqc,fcd->fpqd", _patch_places(texels), places[triangles])
     height, width = picture.shape[:2]
     column = np.floor(uv[..., 0] % 1.0 * width).astype(np.int64).clip(0, width - 1)
     row = np.floor(uv[..., 1] % 1.0 * height).astype(np.int64).clip(0, height - 1)
@@ -286,7 +288,9 @@ def _moved_uv(uv: NDArray[np.float64], moved: Mapping[str, Any]) -> NDArray[np.f
     """[V, 2] places in a picture after KHR_texture_transform: scaled, turned, shifted."""
     angle = float(moved.get("rotation", 0.0))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    return uv * np.asarray(moved.get("scale", (1, 1)), np.float64) @ turn.T + np.asarray(moved.get("offset", (0, 0)), np.float64)
+    scale, offset = (np.asarray(moved.get(key, usual), np.float64) for key, usual in (("scale", (1, 1)), ("offset", (0, 0))))
+    found: NDArray[np.float64] = uv * scale @ turn.T + offset
+    return found
 
 
 def _is_gauze(document: gl.GLTF2, primitive: gl.Primitive) -> bool:
