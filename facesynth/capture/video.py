@@ -15,7 +15,7 @@ import numpy as np
 
 from facesynth.capture.square import Image
 from facesynth.inference.errors import FacesynthError
-from facesynth.speech.containers import COUNTING, beginning
+from facesynth.speech.containers import COUNTING, beginning, video_streams
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -61,9 +61,10 @@ def open_video(path: Path) -> Iterator[Pictures]:
 
 
 def _stream(container: InputContainer, path: Path) -> Any:
-    if not container.streams.video:
+    streams = video_streams(container)
+    if not streams:
         raise FacesynthError(f"{path} has no pictures in it; give a video, or a motion file beside the sound")
-    stream = container.streams.video[0]
+    stream = streams[0]
     width, height = (getattr(stream.codec_context, side, 0) for side in ("width", "height"))
     if not 0 < max(width, height) <= LARGEST_PX:
         raise FacesynthError(f"{path} has pictures of {width} × {height} in a form that is not known; is it damaged?")
@@ -87,7 +88,7 @@ def _typical_rate(path: Path) -> float | None:
     import av
 
     with av.open(str(path)) as container:
-        stream = container.streams.video[0]
+        stream = video_streams(container)[0]
         packets = islice(container.demux(stream), FIRST_PICTURES)
         times = sorted(float(packet.pts * packet.time_base) for packet in packets if packet.pts is not None)
     steps = [later - earlier for earlier, later in pairwise(times) if later > earlier]
@@ -126,7 +127,7 @@ def _slots_s(path: Path) -> Iterator[float]:
     import av
 
     with av.open(str(path)) as container:
-        stream = container.streams.video[0]
+        stream = video_streams(container)[0]
         unit_s = float(stream.time_base or 0)
         return iter(sorted(packet.dts * unit_s for packet in container.demux(stream) if packet.size and packet.dts is not None))
 

@@ -14,10 +14,14 @@ from .errors import FacesynthError
 PCM, EXTENSIBLE = 1, 0xFFFE
 LONG = (b"RF64", b"BW64")
 """First bytes of WAV files that may be longer than 4 GB; a part `ds64` of theirs states the size of the sound."""
+BIG_ENDIAN = b"RIFX"
+"""First bytes of WAV files whose numbers begin with their highest byte."""
 LONG_SIZE = 28
 """Byte at which it does."""
 FIRST_CHUNK = 12
 """Byte at which the first part of the file begins."""
+LARGEST_PADDING = 1 << 16
+"""Zeros behind the sound that fill up a block of a disk."""
 
 
 def read_wav(path: Path) -> tuple[NDArray[np.float32], int]:
@@ -74,17 +78,23 @@ class Samples:
 
 def find_samples(content: bytes | mmap.mmap) -> Samples | None:
     """Where the samples lie: to the end of the file where a recorder never wrote their size; None where there are none."""
-    at = FIRST_CHUNK
+    at, order = FIRST_CHUNK, number_order(content)
     while at + 8 <= len(content):
-        kind, size = struct.unpack_from("<4sI", content, at)
+        kind, size = struct.unpack_from(f"{order}4sI", content, at)
         start = at + 8
         if kind == b"data":
             size = _long_size(content, size)
-            after = start + size + size % 2
-            whole = after >= len(content) or _are_chunks(content, after)
-            return Samples(start, min(start + size, len(content)) if whole else len(content), size)
+            stop = start + size
+            # the byte that makes a size even is not written by all
+            whole = any(_ends_at(content, place, order) for place in {stop + size % 2, stop})
+            return Samples(start, min(stop, len(content)) if whole else len(content), size)
         at = start + size + size % 2
     return None
+
+
+def number_order(content: bytes | mmap.mmap) -> str:
+    """How `struct` reads the numbers of a WAV file."""
+    return ">" if content[:4] == BIG_ENDIAN else "<"
 
 
 def _long_size(content: bytes | mmap.mmap, size: int) -> int:
@@ -93,10 +103,12 @@ def _long_size(content: bytes | mmap.mmap, size: int) -> int:
     return struct.unpack_from("<Q", content, LONG_SIZE)[0] if in_ds64 else size
 
 
-def _are_chunks(content: bytes | mmap.mmap, at: int) -> bool:
-    """Whether parts of a WAV file follow, and not sound that belongs to the part before."""
+def _ends_at(content: bytes | mmap.mmap, at: int, order: str) -> bool:
+    """Whether other parts of a WAV file follow, or padding, and not sound that belongs to the part before."""
+    if at < len(content) <= at + LARGEST_PADDING and not any(content[at:]):
+        return True
     while at + 8 <= len(content):
-        kind, size = struct.unpack_from("<4sI", content, at)
+        kind, size = struct.unpack_from(f"{order}4sI", content, at)
         if not all(32 <= letter < 127 for letter in kind) or at + 8 + size > len(content) + 1:
             return False
         at += 8 + size + size % 2

@@ -21,11 +21,11 @@ from facesynth.atomic import atomic_path
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.long_arrays import Growing, all_finite, by_blocks, let_go, row_blocks
 from facesynth.inference.sound import KAISER_BETA, REACH, Resampler
-from facesynth.inference.wav import FIRST_CHUNK, LONG, LONG_SIZE, find_samples
+from facesynth.inference.wav import BIG_ENDIAN, FIRST_CHUNK, LONG, LONG_SIZE, find_samples, number_order
 from facesynth.packages import is_installed
-from facesynth.speech.containers import PRIMED, read_container, unstated_priming
+from facesynth.speech.containers import read_container
 from facesynth.speech.one_channel import one_channel
-from facesynth.speech.stopped_recorders import AU, FORM, mended
+from facesynth.speech.stopped_recorders import may_be_mended, mended
 
 if TYPE_CHECKING:
     from torchaudio.transforms import Resample
@@ -43,12 +43,8 @@ LARGEST_KERNEL = 1 << 20
 16 000 × 44 157 (2.8 GB) from 44 101 Hz. Rates with so little in common take the polyphase filter of the ground floor."""
 BLOCK = 1 << 20
 """Samples read or resampled at once, about."""
-MPEG = frozenset({"MPEG", "MP3"})
-LAYERS = {"MPEG_LAYER_II": "mp2"}
-"""Codecs of that format which are not MP3."""
-"""What libsndfile calls MP3."""
-MPEG_FRAME = 2048
-"""Bytes that the first frame has at most, in which the priming is stated."""
+WITH_PACKETS = frozenset({"MPEG", "MP3", "OGG", "FLAC"})
+"""Formats of libsndfile's that FFmpeg reads better: by their packets, whatever their headers state, and where pages are lost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,14 +198,11 @@ def _read_plain(path: Path) -> Recorded | None:
             source, remarks = _mended(opened, stored)
             # by its path where it needs no mending: libsndfile seeks before the beginning of damaged files
             with soundfile.SoundFile(path if source is stored else source) as file:
-                audio = one_channel(partial(_blocks, file))
-                layer = LAYERS.get(file.subtype, "mp3")
-                rate, priming = int(file.samplerate), _priming(stored, layer) if file.format in MPEG else 0
+                if file.format in WITH_PACKETS or file.subtype.startswith("MPEG"):
+                    return None
+                return Recorded(one_channel(partial(_blocks, file)), int(file.samplerate), remarks)
     except (soundfile.LibsndfileError, RuntimeError):
         return None
-    if priming:
-        remarks = (*remarks, *unstated_priming(layer, priming, rate))
-    return Recorded(audio[priming:], rate, remarks)
 
 
 def _blocks(file: Any) -> Iterator[NDArray[np.float32]]:
@@ -222,10 +215,10 @@ def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, .
     """The file, its header mended in memory where a recorder never wrote the size of the sound; and what was noticed."""
     head = stored.read(FIRST_CHUNK)
     stored.seek(0)
-    if head[:4] in (FORM, AU):
+    if may_be_mended(head):
         whole = mended(opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ)))
         return (stored, ()) if whole is None else (BytesIO(whole[0]), (whole[1],))
-    if head[:4] not in (b"RIFF", *LONG) or head[8:] != b"WAVE":
+    if head[:4] not in (b"RIFF", BIG_ENDIAN, *LONG) or head[8:] != b"WAVE":
         return stored, ()
     content = opened.enter_context(mmap.mmap(stored.fileno(), 0, access=mmap.ACCESS_READ))
     found = find_samples(content)
@@ -239,16 +232,7 @@ def _mended(opened: ExitStack, stored: BinaryIO) -> tuple[BinaryIO, tuple[str, .
         struct.pack_into("<Q", sized, LONG_SIZE, found.stop - found.start)
         struct.pack_into("<I", sized, found.start - 4, 0xFFFFFFFF)
     else:
-        struct.pack_into("<I", sized, found.start - 4, found.stop - found.start)
-        struct.pack_into("<I", sized, 4, len(sized) - 8)
+        order = number_order(content)
+        struct.pack_into(f"{order}I", sized, found.start - 4, found.stop - found.start)
+        struct.pack_into(f"{order}I", sized, 4, len(sized) - 8)
     return BytesIO(sized), (found.remark,)
-
-
-def _priming(stored: BinaryIO, layer: str) -> int:
-    """Samples that an encoder of MPEG put in front where the file does not say how many; libsndfile takes off the stated"""
-    stored.seek(0)
-    head = stored.read(10)
-    title = sum((byte & 127) << 7 * k for k, byte in enumerate(head[:5:-1])) + 10 if head[:3] == b"ID3" else 0
-    stored.seek(title)
-    first = stored.read(MPEG_FRAME)
-    return 0 if b"Xing" in first or b"Info" in first else PRIMED[layer]

@@ -4,15 +4,16 @@ Packets of sound carry times. Where a recorder lost some, or a stream was cut, t
 would be early or late against the pictures. So each block is laid where its time says, and what is between is silence.
 
 Sample 0 is where the first picture or the first sound lies, whichever is earlier: the same moment from which
-`facesynth.capture.video` counts. Encoders put silence in front of the sound, their priming. MP4, Matroska and Ogg say how
-much, and FFmpeg takes it off; MPEG-TS and FLV begin the sound as much before the pictures; raw streams and AVI say nothing.
-Of these it is taken off as far as any encoder puts it there, and told.
+`facesynth.capture.video` counts. Encoders put silence in front of the sound, their priming. MP4, Matroska and Ogg can say how
+much, and FFmpeg takes it off; MPEG-TS and FLV begin the sound as much before the pictures; raw streams and AVI say nothing, nor
+does an MP4 or Matroska without that entry. Of these it is taken off as far as any encoder puts it there, and told.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -47,8 +48,10 @@ LATEST = {"aac": 2112, "mp3": 1682}
 """Samples that some encoder puts in front."""
 BESIDE_PICTURES = frozenset({"aac", "mp3"})
 """Codecs whose containers show by the pictures' time stamps whether they leave that in."""
-STATED = frozenset({"mov", "mp4", "m4a", "matroska", "webm", "ogg"})
-"""Formats that say how much priming there is."""
+SKIPPED = "skip_samples"
+"""What FFmpeg notes on the first packet of a sound whose file says how much priming there is."""
+LINKED = "ogg"
+"""A format in which one recording may follow another, each with times of its own."""
 COUNTING = "avi"
 """A format without time stamps."""
 STAMP_S = 1e-3
@@ -75,6 +78,10 @@ class Beginning:
     """Whether the container states no times, but counts samples and pictures."""
     later_s: float = 0.0
     """By how much the sound lies later than by its own count, on the count of the pictures."""
+    linked: bool = False
+    """Whether the container may hold one recording after the other."""
+    sounds: int = 1
+    """How many sounds the file holds."""
 
     @property
     def zero_s(self) -> float:
@@ -85,11 +92,19 @@ class Beginning:
             return self.picture_s
         return min(self.sound_s, self.picture_s)
 
+    def _shows_priming(self) -> bool:
+        """Whether the sound begins as much before the pictures as its encoder puts in front."""
+        if self.sound_s is None or self.picture_s is None or self.counted:
+            return False
+        return abs(self.picture_s - self.sound_s - self.priming / self.rate) <= 2 * STAMP_S
+
     def remarks(self) -> Iterator[str]:
         """What a person should know of it."""
         if self.sound_s is None:
             return
-        if self.priming and (self.picture_s is None or self.counted or self.sound_s == self.picture_s):
+        if self.sounds > 1:
+            yield f"the file holds {self.sounds} sounds; the first of them is used"
+        if self.priming and not self._shows_priming():
             taken_off = self.priming if self.picture_s is None or self.counted else 0
             yield from unstated_priming(self.codec, taken_off, self.rate)
         if self.sound_s - self.zero_s > TOLD_S:
@@ -119,20 +134,38 @@ def read_container(path: Path) -> tuple[Floats, int, tuple[str, ...]]:
         begin = beginning(path)
         if begin.sound_s is None:
             raise FacesynthError(f"{path} has no sound in it; give a file with an audio track")
-        blocks: list[tuple[float, int]] = []
-        strung = one_channel(partial(_blocks, path, blocks))
+        decoded = _Decoded()
+        strung = one_channel(partial(_blocks, path, decoded))
     except FacesynthError:
         raise
     except (av.FFmpegError, ValueError) as error:  # damaged titles are no Unicode, damaged streams no layout that is known
         reason = getattr(error, "strerror", "") or error
         raise FacesynthError(f"{path} cannot be read as sound or video ({reason}); is it damaged?") from None
-    if not blocks:
+    decoded.require_most_whole(path)
+    if not decoded.lengths:
         return strung, begin.rate, ()
-    times_s, lengths = zip(*blocks, strict=True)
+    times_s, lengths = np.array(decoded.times_s), decoded.lengths
+    links: tuple[str, ...] = ()
+    if begin.linked:
+        times_s, links = one_after_the_other(times_s, lengths, begin.rate)
     lost = lost_sound(path, begin.later_s) if begin.counted else ()
-    counted_s = _later(np.array(times_s), lost) + begin.later_s
+    counted_s = _later(times_s, lost) + begin.later_s
     audio, remarks = laid(path, strung, lengths, counted_s - begin.zero_s, begin.rate)
-    return audio, begin.rate, (*begin.remarks(), *(_said_of_lost(lost) if lost else remarks))
+    of_times = _said_of_lost(lost) if lost else remarks
+    return audio, begin.rate, (*begin.remarks(), *links, *decoded.remarks(begin.zero_s), *of_times)
+
+
+def one_after_the_other(
+    times_s: NDArray[np.float64], lengths: Sequence[int], rate: int
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Times [N] of blocks of several recordings in one file, each of which counts from its own 0, as if they were one."""
+    ends_s = times_s + np.array(lengths) / rate
+    back = np.flatnonzero(np.diff(times_s) < -LARGEST_OVERLAP_S) + 1
+    whole = times_s.copy()
+    for start in back:
+        whole[start:] += whole[start - 1] + ends_s[start - 1] - times_s[start - 1] - whole[start]
+    said = f"the file holds {len(back) + 1} recordings one after the other; they were strung together"
+    return whole, (said,) if len(back) else ()
 
 
 def _later(times_s: NDArray[np.float64], lost: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
@@ -153,7 +186,7 @@ def beginning(path: Path) -> Beginning:
     import av
 
     with av.open(str(path)) as container:
-        picture = _first_frame(container, [s for s in container.streams.video if not s.disposition.value & ATTACHED_PICTURE])
+        picture, _ = _first_frame(container, video_streams(container))
     with av.open(str(path)) as container:
         if not container.streams.audio:
             return Beginning(None, _time_s(picture), 0, 0, "")
@@ -162,14 +195,19 @@ def beginning(path: Path) -> Beginning:
         if rate < LOWEST_HZ:
             raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
         codec = next((name for name in PRIMED if codec.startswith(name)), codec)
-        states = bool(STATED & set(container.format.name.split(",")))
-        counted = container.format.name == COUNTING
-        known = not states and (picture is None or counted or codec in BESIDE_PICTURES)
+        name, sounds = container.format.name, len(container.streams.audio)
+        if name == COUNTING and picture is not None:
+            return replace(_counted(container, PRIMED.get(codec, 0), rate, codec), sounds=sounds)
+        sound, is_stated = _first_frame(container, [stream])
+        known = not is_stated and (picture is None or codec in BESIDE_PICTURES)
         priming = PRIMED.get(codec, 0) if known else 0
-        if counted and picture is not None:
-            return _counted(container, priming, rate, codec)
-        sound = _first_frame(container, [stream])
-        return Beginning(_time_s(sound) or 0.0, _time_s(picture), priming, rate, codec, counted)
+        begins_s, seen_s = _time_s(sound) or 0.0, _time_s(picture)
+        return Beginning(begins_s, seen_s, priming, rate, codec, name == COUNTING, linked=name == LINKED, sounds=sounds)
+
+
+def video_streams(container: InputContainer) -> list[Any]:
+    """The streams of moving pictures: a title picture is none."""
+    return [stream for stream in container.streams.video if not stream.disposition.value & ATTACHED_PICTURE]
 
 
 # AVI counts: sound and pictures both begin at 0, so that the sound is late by its priming. Writers that know of it (FFmpeg) leave
@@ -177,7 +215,7 @@ def beginning(path: Path) -> Beginning:
 # to the sound after the priming, to the sample.
 def _counted(container: InputContainer, priming: int, rate: int, codec: str) -> Beginning:
     """When sound and pictures of an AVI begin, on the count of its pictures."""
-    stream = container.streams.video[0]
+    stream = video_streams(container)[0]
     places = islice((packet.dts for packet in container.demux(stream) if packet.size and packet.dts is not None), 2)
     first, second = (*places, 0, 0)[:2]
     unit_s, late_s = float(stream.time_base or 0), priming / rate
@@ -188,45 +226,89 @@ def _counted(container: InputContainer, priming: int, rate: int, codec: str) -> 
     return Beginning(sound_s, seen_s, priming, rate, codec, counted=True, later_s=sound_s)
 
 
-def _first_frame(container: InputContainer, streams: Sequence[Any]) -> Any:
-    """The first frame of a stream, or None where none can be decoded."""
+def _first_frame(container: InputContainer, streams: Sequence[Any]) -> tuple[Any, bool]:
+    """The first frame of a stream, or None where none can be decoded; and whether the file says how much priming it has."""
     import av
 
-    if not streams:
-        return None
-    try:
-        for number, packet in enumerate(container.demux(streams[0])):
+    is_stated = False
+    for number, packet in enumerate(container.demux(streams[0]) if streams else ()):
+        is_stated = is_stated or packet.has_sidedata(SKIPPED)
+        with suppress(av.FFmpegError, ValueError):
             for frame in packet.decode():
-                return frame
-            if number > FIRST_PACKETS:
-                return None
-    except (av.FFmpegError, ValueError):
-        return None
-    return None
+                return frame, is_stated
+        if number > FIRST_PACKETS:
+            break
+    return None, is_stated
 
 
 def _time_s(frame: Any) -> float | None:
     return None if frame is None or frame.pts is None else float(frame.pts * frame.time_base)
 
 
-def _blocks(path: Path, found: list[tuple[float, int]]) -> Iterator[Floats]:
-    """The decoded sound in blocks [n, channels]; `found` becomes the time of each, NaN where it has none, and its length."""
+@dataclass
+class _Decoded:
+    """What came of the packets of a sound."""
+
+    times_s: list[float] = field(default_factory=list)
+    """When each block begins, NaN where it has no time."""
+    lengths: list[int] = field(default_factory=list)
+    """Samples of each block."""
+    damaged_s: list[float] = field(default_factory=list)
+    """Times of the packets that cannot be decoded."""
+    packets: int = 0
+
+    def require_most_whole(self, path: Path) -> None:
+        """FacesynthError where most of the sound is damaged."""
+        if 2 * len(self.damaged_s) > self.packets or (self.damaged_s and not self.lengths):
+            raise FacesynthError(
+                f"{path} cannot be read as sound or video ({len(self.damaged_s)} of {self.packets} packets of its sound are"
+                " damaged); copy it again"
+            )
+
+    def remarks(self, zero_s: float) -> Iterator[str]:
+        """What a person should know of it."""
+        if self.damaged_s:
+            yield (
+                f"{len(self.damaged_s)} of {self.packets} packets of the sound are damaged, the first at"
+                f" {self.damaged_s[0] - zero_s:.2f} s; they are silent"
+            )
+
+
+def _blocks(path: Path, found: _Decoded) -> Iterator[Floats]:
+    """The decoded sound in blocks [n, channels], as many in all as the first has; `found` becomes what came of it."""
     import av
 
-    found.clear()
+    found.times_s, found.lengths, found.damaged_s, found.packets = [], [], [], 0
     with av.open(str(path)) as container:
-        rate = int(container.streams.audio[0].rate)
-        resampler = av.AudioResampler(format="fltp", rate=rate)
-        for frame in _with_end(container):
-            for block in resampler.resample(frame):
-                time_s = _time_s(block)
-                found.append((np.nan if time_s is None else time_s, block.samples))
-                yield block.to_ndarray().T.astype(np.float32)
+        rate, kind, layout, resampler = int(container.streams.audio[0].rate), None, None, None
+        for frame in _frames(container, found):
+            if (frame.format.name, frame.layout.name, frame.sample_rate) != kind:  # it may change within a broadcast
+                yield from _resampled(resampler, None, found)
+                kind, layout = (frame.format.name, frame.layout.name, frame.sample_rate), layout or frame.layout
+                resampler = av.AudioResampler(format="fltp", layout=layout, rate=rate)
+            yield from _resampled(resampler, frame, found)
+        yield from _resampled(resampler, None, found)
 
 
-def _with_end(container: InputContainer) -> Iterator[Any]:
-    yield from container.decode(audio=0)
-    yield None
+def _resampled(resampler: Any, frame: Any, found: _Decoded) -> Iterator[Floats]:
+    for block in resampler.resample(frame) if resampler is not None else ():
+        time_s = _time_s(block)
+        found.times_s.append(np.nan if time_s is None else time_s)
+        found.lengths.append(block.samples)
+        yield block.to_ndarray().T.astype(np.float32)
+
+
+def _frames(container: InputContainer, found: _Decoded) -> Iterator[Any]:
+    """The frames of the first sound; packets that are damaged are noted and passed over."""
+    import av
+
+    for packet in container.demux(audio=0):
+        found.packets += bool(packet.size)
+        try:
+            yield from packet.decode()
+        except av.InvalidDataError:
+            if packet.size:
+                found.damaged_s.append(np.nan if packet.pts is None else float(packet.pts * packet.time_base))
 
 
 def laid(

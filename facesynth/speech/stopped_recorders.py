@@ -1,8 +1,10 @@
-"""AIFF and AU of a recorder that was stopped short: headers whose sizes were never written are mended in memory.
+"""AIFF, AU, CAF and W64 of a recorder that was stopped short: headers whose sizes were never written are mended in memory.
 
-Both count big-endian. An AIFF is a `FORM` of parts, each a name of four letters, its size and its content, filled up to an even
-number of bytes; `COMM` states the number of frames, `SSND` holds them behind 8 bytes. The header of an AU states where the sound
-begins and how long it is, 0xFFFFFFFF where that is not known.
+All but W64 count big-endian. An AIFF is a `FORM` of parts, each a name of four letters, its size and its content, filled up to an
+even number of bytes; `COMM` states the number of frames, `SSND` holds them behind 8 bytes. The header of an AU states where the
+sound begins and how long it is, 0xFFFFFFFF where that is not known. A CAF is a row of parts with sizes of 64 bits; its `data`
+holds 4 bytes and the sound, and a size of -1 says that it goes on to the end. The parts of a W64 are named by 16 bytes, and their
+sizes count these and themselves.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ from mmap import mmap
 from typing import NamedTuple
 
 Content = bytes | mmap
-FORM, AU = b"FORM", b".snd"
+FORM, AU, CAF, W64 = b"FORM", b".snd", b"caff", b"riff"
+CAF_FIRST, CAF_BEFORE_SOUND = 8, 4
+W64_FIRST, W64_HEAD, W64_ALIGNED = 40, 24, 8
 FIRST, BEFORE_SOUND = 12, 8
 UNKNOWN = 0xFFFFFFFF
 LARGEST_HEADER = 1 << 20
@@ -27,11 +31,75 @@ class _Part(NamedTuple):
     size: int
 
 
+def may_be_mended(head: bytes) -> bool:
+    """Whether a file that begins so is of a kind that is known here."""
+    return head[:4] in (FORM, AU, CAF, W64)
+
+
 def mended(content: Content) -> tuple[bytearray, str] | None:
     """The file with its sizes, and what is said of it; None where it needs nothing, or is no such file."""
     if content[:4] == FORM and content[8:12] in (b"AIFF", b"AIFC"):
         return _aiff(content)
+    if content[:4] == CAF:
+        return _caf(content)
+    if content[:4] == W64:
+        return _w64(content)
     return _au(content) if content[:4] == AU and len(content) >= 24 else None
+
+
+def _caf(content: Content) -> tuple[bytearray, str] | None:
+    at = CAF_FIRST
+    while at + 12 <= len(content):
+        name, size = struct.unpack_from(">4sq", content, at)
+        start = at + 12
+        if name == b"data":
+            there = len(content) - start
+            if size < 0 or size >= there or (size > CAF_BEFORE_SOUND and _caf_goes_on(content, start + size)):
+                return None
+            whole = bytearray(content)
+            struct.pack_into(">q", whole, at + 4, there)
+            return whole, _said(max(0, size - CAF_BEFORE_SOUND), there - CAF_BEFORE_SOUND)
+        if size < 0:
+            return None
+        at = start + size
+    return None
+
+
+def _caf_goes_on(content: Content, at: int) -> bool:
+    while at + 12 <= len(content):
+        name, size = struct.unpack_from(">4sq", content, at)
+        if size < 0 or not all(32 <= letter < 127 for letter in name):
+            return False
+        at += 12 + size
+    return at == len(content)
+
+
+def _w64(content: Content) -> tuple[bytearray, str] | None:
+    at = W64_FIRST
+    while at + W64_HEAD <= len(content):
+        size = struct.unpack_from("<Q", content, at + W64_HEAD - 8)[0]
+        if content[at : at + 4] == b"data":
+            there = len(content) - at
+            stop = at + -(-size // W64_ALIGNED) * W64_ALIGNED
+            if size >= there or (size > W64_HEAD and _w64_goes_on(content, stop)):
+                return None
+            whole = bytearray(content)
+            struct.pack_into("<Q", whole, at + W64_HEAD - 8, there)
+            struct.pack_into("<Q", whole, W64_HEAD - 8, len(whole))
+            return whole, _said(max(0, size - W64_HEAD), there - W64_HEAD)
+        if size < W64_HEAD:
+            return None
+        at += -(-size // W64_ALIGNED) * W64_ALIGNED
+    return None
+
+
+def _w64_goes_on(content: Content, at: int) -> bool:
+    while at + W64_HEAD <= len(content):
+        size = struct.unpack_from("<Q", content, at + W64_HEAD - 8)[0]
+        if size < W64_HEAD or not all(32 <= letter < 127 for letter in content[at : at + 4]):
+            return False
+        at += -(-size // W64_ALIGNED) * W64_ALIGNED
+    return at >= len(content)
 
 
 def _aiff(content: Content) -> tuple[bytearray, str] | None:

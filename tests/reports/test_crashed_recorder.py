@@ -71,6 +71,23 @@ def test_long_files_of_recorders_state_their_size_elsewhere(tmp_path, in_data, i
     assert f"the header states {stated} bytes of sound" in sound.remarks[0]
 
 
+@pytest.mark.parametrize("stated", [0, 1000, 60000])
+@pytest.mark.parametrize("kind", ["RIFX", "CAF", "W64"])
+def test_other_kinds_of_a_recorders_files_are_read_to_the_end_and_told(tmp_path, kind, stated):
+    path = tmp_path / "a.wav"
+    soundfile.write(
+        path, SOUND, RATE, subtype="PCM_16", format=kind.replace("RIFX", "WAV"), endian="BIG" if kind == "RIFX" else "FILE"
+    )
+    assert read_sound(path).remarks == ()
+    content = bytearray(path.read_bytes())
+    form, behind, more = {"RIFX": (">I", 4, 0), "CAF": (">q", 4, 4), "W64": ("<Q", 16, 24)}[kind]
+    struct.pack_into(form, content, content.index(b"data") + behind, stated + more)
+    path.write_bytes(content)
+    sound = read_sound(path)
+    np.testing.assert_allclose(sound.audio, SOUND, atol=1e-4)
+    assert sound.remarks[0].startswith(f"the header states {stated} bytes of sound")
+
+
 def test_parts_after_the_sound_are_no_sound(tmp_path):
     path = tmp_path / "a.wav"
     soundfile.write(path, SOUND, RATE)
@@ -80,6 +97,15 @@ def test_parts_after_the_sound_are_no_sound(tmp_path):
         sound = read_sound(path)
         assert len(sound.audio) == len(SOUND)
         assert sound.remarks == ()
+    soundfile.write(path, SOUND[:-1], RATE, subtype="PCM_U8")
+    whole = path.read_bytes()[: 44 + len(SOUND) - 1]
+    for end in (title, b"\0" + title, bytes(3000)):  # a missing byte that makes the size even, and a disk's block filled up
+        path.write_bytes(whole + end)
+        sound = read_sound(path)
+        assert (len(sound.audio), sound.remarks) == (len(SOUND) - 1, ())
+    soundfile.write(path, SOUND, RATE, format="CAF")
+    path.write_bytes(path.read_bytes() + b"info" + struct.pack(">q", 4) + b"abcd")
+    assert (len(read_sound(path).audio), read_sound(path).remarks) == (len(SOUND), ())
 
 
 def test_the_runtime_reads_it_too(tmp_path):

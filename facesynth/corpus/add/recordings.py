@@ -11,9 +11,13 @@ from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.speech.textgrid import is_silence_mark
 
-AUDIO = frozenset({".wav", ".flac", ".ogg", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".wma"})
+AUDIO = frozenset(
+    {".wav", ".bwf", ".rf64", ".w64", ".caf", ".aif", ".aiff", ".aifc", ".au", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".mp2"}
+    | {".m4a", ".aac", ".ac3", ".mka", ".wma", ".amr"}
+)
 VIDEO = frozenset(
     {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".flv", ".3gp", ".wmv", ".ogv"}
+    | {".mxf", ".asf", ".vob", ".f4v", ".3g2"}
 )
 MOTION = FORMATS.keys()
 PHONES = frozenset({".textgrid", ".lab", ".phn"})
