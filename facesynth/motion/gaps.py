@@ -100,9 +100,9 @@ FAR = 10.0
 
 
 def filled_in(points: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """[T, K] which of the points [T, K, 3] are no places but what programs write for a gap: 0, 0, 0, or a number far away.
+    """[T, K] which of the points [T, K, 3 or 2] are no places but what programs write for a gap: 0, 0, 0, or a number far away.
 
-    Such numbers (-16512, 9999.999, 99999, …) stand in all three coordinates, or in one; a marker at exactly three zeros,
+    Such numbers (-16512, 9999.999, 99999, …) stand in all coordinates, or in one; a marker at exactly nothing but zeros,
     or metres from the face, there is none.
     """
     step = max(1, len(points) // LOOKED_AT)
@@ -129,7 +129,7 @@ def _zeros(points: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 
 def _alike(points: NDArray[np.floating]) -> NDArray[np.bool_]:
-    return (points[..., 0] == points[..., 1]) & (points[..., 1] == points[..., 2])
+    return np.asarray((points == points[..., :1]).all(axis=-1))
 
 
 def _commonest_extremes(points: NDArray[np.floating]) -> list[list[float]]:

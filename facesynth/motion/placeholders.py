@@ -14,9 +14,9 @@ BESIDE = 0.1
 
 
 def placeholders(points: NDArray[np.floating], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """[T, K] which of the points [T, K, 3] stand exactly, for SHORTEST_RUN frames or more, where no face is.
+    """[T, K] which of the points [T, K, 3 or 2] stand exactly, for SHORTEST_RUN frames or more, where no face is.
 
-    known: [T, K] those that are missing for another reason. None in a file whose markers mostly stand still. Three equal
+    known: [T, K] those that are missing for another reason. None in a file whose markers mostly stand still. Equal
     coordinates count wherever they lie outside of all places that markers pass through; others only further off, while most
     markers move, and of a marker that is also measured.
     """

@@ -5,20 +5,13 @@ import struct
 import bringing
 import numpy as np
 import pytest
+from c3d_files import DEC, INTEL, MIPS, NAMES, Parameter, face, file, write
 from mocap_files import write_c3d
 
 from facesynth.corpus.importers.formats import read
 from facesynth.inference.errors import FacesynthError
 
 pytest.importorskip("c3d")
-NAMES = ["brow_l", "brow_r", "lip_upper", "lip_lower", "chin", "nose"]
-REST = np.array([[40, 60, 50], [-40, 60, 50], [0, -30, 70], [0, -32, 69], [0, -70, 60], [0, 10, 90.0]])
-
-
-def face(count=300, seed=0):
-    """[count, 6, 3] markers of a face that moves, mm."""
-    rng = np.random.default_rng(seed)
-    return REST + rng.normal(0, 2, (count, 6, 3))
 
 
 def with_extra(path, points, labels, lists, fps=120.0):
@@ -72,6 +65,60 @@ def test_a_face_that_walks_through_the_room_has_no_gaps(tmp_path):
     assert np.isfinite(read(write_c3d(tmp_path / "a.c3d", points, labels=NAMES)).motion.frames).all()
 
 
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("processor", [INTEL, DEC, MIPS])
+def test_every_processor_writes_the_same_markers_and_gaps(tmp_path, processor, whole):
+    points = face()
+    points[20:40, 2] = points[100:103] = np.nan
+    reading = read(write(tmp_path / "a.c3d", file(points, processor=processor, whole_numbers=whole)))
+    np.testing.assert_allclose(reading.motion.points, points, atol=0.003)
+    filled = file(np.nan_to_num(points), processor=processor, whole_numbers=whole, residuals=np.zeros((300, 6)))
+    np.testing.assert_allclose(read(write(tmp_path / "a.c3d", filled)).motion.points, points, atol=0.003)
+
+
+@pytest.mark.parametrize(
+    ("without", "header", "said"),
+    [
+        ([(1, "RATE")], {}, ""),
+        ([(1, "SCALE"), (1, "FRAMES"), (1, "USED"), (1, "DATA_START")], {}, ""),
+        ([(2, "USED"), (2, "RATE"), (2, "GEN_SCALE")], {}, ""),
+        ([], {"rate": 0.0}, ""),
+        ([], {"rate": 100.0}, "its header states 100 frames a second, its parameters 120, which was taken"),
+        ([], {"data": 0}, ""),
+        ([], {"first": 500, "last": 799}, ""),
+        ([], {"per_frame": 10}, ""),
+        ([(1, "UNITS")], {}, "states no unit"),
+    ],
+)
+def test_what_header_and_parameters_need_not_both_say(tmp_path, without, header, said):
+    reading = read(write(tmp_path / "a.c3d", file(face(), without=without, header=header)))
+    np.testing.assert_allclose(reading.motion.points, face(), atol=1e-4)
+    assert reading.motion.fps == 120
+    assert len(reading.remarks) == bool(said)
+    assert said in "".join(reading.remarks)
+
+
+@pytest.mark.parametrize("header", [{"points": 5}, {"scale": 0.1}])
+def test_a_file_that_contradicts_itself_is_refused(tmp_path, header):
+    with pytest.raises(FacesynthError, match="contradicts itself"):
+        read(write(tmp_path / "a.c3d", file(face(), header=header)))
+
+
+@pytest.mark.parametrize("filler", [0.0, -1.0, 9999.0])
+@pytest.mark.parametrize("rounded", [False, True])
+def test_landmarks_in_pictures_have_such_gaps_too(tmp_path, filler, rounded):
+    points = face()[..., :2] + 300
+    points = np.round(points) if rounded else points
+    path = tmp_path / "a.npz"
+    np.savez(path, frames=points, names=np.array(NAMES), fps=30.0)
+    assert read(path).remarks == ()
+    points[20:40, 2] = filler
+    np.savez(path, frames=points, names=np.array(NAMES), fps=30.0)
+    reading = read(path)
+    assert np.array_equal(np.argwhere(np.isnan(reading.motion.points[..., 0])), [(t, 2) for t in range(20, 40)])
+    assert "they are gaps" in reading.remarks[0]
+
+
 @pytest.mark.parametrize("kind", ["ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS"])
 @pytest.mark.parametrize("subject", ["", "Ada:"])
 def test_outputs_of_a_model_are_no_markers(tmp_path, kind, subject):
@@ -105,6 +152,22 @@ def test_outputs_are_known_whichever_states_the_subject(tmp_path, markers, outpu
     assert "2 outputs of a model" in reading.remarks[0]
 
 
+@pytest.mark.parametrize(
+    "lists",
+    [
+        {"ANGLES": ["HeadAngles"], "REACTIONS": ["Ground"]},
+        {"ANGLES": ["headangles", "GROUND"]},
+        {"ANGLES": ["HeadAngles"], "PHASES": ["Ground"], "TYPE_GROUPS": ["ANGLES", "PHASES", "MODELED_MARKERS"]},
+    ],
+)
+def test_outputs_in_lists_of_other_names_and_in_other_case(tmp_path, lists):
+    points = np.concatenate([face(), np.full((300, 2, 3), 90.0)], axis=1)
+    more = [Parameter.texts(1, name, labels) for name, labels in {**lists, "MODELED_MARKERS": ["nose"]}.items()]
+    reading = read(write(tmp_path / "a.c3d", file(points, [*NAMES, "HeadAngles", "Ground"], more=more)))
+    assert reading.motion.layout.names == tuple(NAMES)
+    assert "2 outputs of a model" in reading.remarks[0]
+
+
 @pytest.mark.parametrize("label", ["Bo:chest", "chest"])
 def test_a_marker_called_like_the_output_of_another_subject_is_kept(tmp_path, label):
     points = np.concatenate([face(), np.full((300, 1, 3), 90.0), face()[:, :1]], axis=1)
@@ -128,12 +191,25 @@ def test_a_marker_called_like_the_output_of_another_subject_is_kept(tmp_path, la
         ("feet", 304.8),
         ("µm", 1e-3),
         ("M", 1000),
+        ("Meters (m)", 1000),
+        ("mtr", 1000),
+        ("metros", 1000),
+        ("millimeter(s)", 1),
+        ("Millimètres", 1),
+        ("mm mm mm", 1),
+        ("Zentimeter", 10),
     ],
 )
 def test_units_in_their_usual_spellings(tmp_path, unit, mm):
-    reading = read(write_c3d(tmp_path / "a.c3d", face() / mm, unit=unit, labels=NAMES))
+    reading = read(write(tmp_path / "a.c3d", file(face() / mm, unit=unit)))
     np.testing.assert_allclose(reading.motion.points, face(), rtol=1e-4, atol=1e-3)
     assert reading.remarks == ()
+
+
+@pytest.mark.parametrize("unit", ["meter/s", "pixels", "deg"])
+def test_what_is_no_length_is_refused(tmp_path, unit):
+    with pytest.raises(FacesynthError, match="known units are"):
+        read(write(tmp_path / "a.c3d", file(face(), unit=unit)))
 
 
 def test_a_unit_that_contradicts_the_size_of_a_face_is_told(tmp_path):

@@ -3,11 +3,12 @@
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facesynth.corpus.importers.c3d_samples import BLOCK, form_of, length_of, read_samples
 from facesynth.corpus.importers.description import UNITS_MM, Written, unit_mm
 from facesynth.corpus.importers.reading import Reading, Sound, motion_of_arrays, open_gaps, require_file
 from facesynth.corpus.motion_files import shortened
@@ -17,12 +18,11 @@ from facesynth.inference.layout import Layout
 SOUNDS = ("audio", "sound", "mic", "voice", "speech")
 """What analog channels that hold sound are called."""
 LOWEST_SOUND_HZ = 4000
-MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS")
+MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 """Parameters that list points which are none."""
-BLOCK = 512
-"""Bytes that files are padded to."""
-FULL = 65535
-"""The highest count of 16 bits."""
+POINT_LISTS = frozenset({"LABELS", "MARKERS", "MODELED_MARKERS", "MODELLED_MARKERS"})
+"""Parameters that list points which are places."""
+NO_UNIT = frozenset({"", "none", "n/a", "na", "null", "unknown", "undefined", "unit", "units"})
 FACE_MM = (25.0, 1000.0)
 """Diagonal that the markers of a face have, from a mouth alone to head and shoulders."""
 USUAL_FACE_MM = 250.0
@@ -41,7 +41,7 @@ def read_c3d(path: Path, layout: Layout | None = None, written: Written | None =
     are_outputs = _of_model(content.labels, content.outputs)
     labels = _without_subject(content.labels, are_outputs)
     written = written or Written()
-    unit = content.unit or "mm"
+    unit = content.unit
     if not written.unit and unit_mm(unit) is None:
         raise FacesynthError(
             f"{path} is in {content.unit!r}; known units are {', '.join(UNITS_MM)}; say the right one in a layout file:"
@@ -87,13 +87,13 @@ def _size(frames: NDArray[np.float64], unit: str) -> list[str]:
 
 
 def _of_model(labels: list[str], listed: frozenset[str]) -> NDArray[np.bool_]:
-    """Which points are outputs: listed under their own name, else with a subject that only the list or only the label states."""
-    unmatched = listed - set(labels)
+    """Which points are outputs: listed under their own name, in any case, else with a subject that one of list and label states."""
+    lists, names = {name.lower() for name in listed}, [label.lower() for label in labels]
+    unmatched = lists - set(names)
     bare = {name for name in unmatched if ":" not in name}
     of_subjects = {name.rpartition(":")[2] for name in unmatched if ":" in name}
     return np.array(
-        [label in listed or (label.rpartition(":")[2] in bare if ":" in label else label in of_subjects) for label in labels],
-        bool,
+        [name in lists or (name.rpartition(":")[2] in bare if ":" in name else name in of_subjects) for name in names], bool
     )
 
 
@@ -137,7 +137,8 @@ def _opened(path: Path) -> _Content:
     try:
         with warnings.catch_warnings(), open(path, "rb") as file:
             warnings.simplefilter("ignore")
-            content = _content(Reader(file), path.stat().st_size)
+            tolerant = type("ReaderOfAnyHeader", (Reader,), {"_check_metadata": lambda _: None})
+            content = _content(tolerant(file), file, path.stat().st_size)
     except FacesynthError as error:
         raise FacesynthError(f"{path} {error}") from None
     except Exception as error:  # the library raises anything, bare Exception too, on damaged files
@@ -147,79 +148,43 @@ def _opened(path: Path) -> _Content:
     return content
 
 
-def _content(reader: Any, size: int) -> _Content:
+def _content(reader: Any, file: BinaryIO, size: int) -> _Content:
     for name in ("OFFSET", "SCALE"):  # with a single analog channel many programs write a number, the library wants an array
         parameter = reader.get(f"ANALOG:{name}")
         if parameter is not None and not parameter.dimensions:
             parameter.dimensions = [1]
-    count = int(reader.point_used)
-    length, remarks = _length(reader, size)
-    frames, analog = np.full((length, count, 3), np.nan), []
-    reader.__class__ = _of_length(type(reader), length)
-    for number, (_, points, channels) in enumerate(reader.read_frames()):
-        frames[number] = np.where(points[:, 3:4] < 0, np.nan, points[:, :3])
-        analog.append(channels.astype(np.float32))
+    form, said = form_of(reader)
+    length, remarks = length_of(reader, form, size)
+    frames, analog = read_samples(file, form, length)
     if remarks:  # files are padded to whole blocks
-        padded = BLOCK // (16 * count) + 1 if count else 0
-        empty = next((k for k in range(padded) if np.any(frames[len(frames) - 1 - k])), padded)
-        frames, analog = frames[: len(frames) - empty], analog[: len(frames) - empty]
-    unit = reader.get("POINT:UNITS")
+        padded = BLOCK // (16 * form.points) + 1 if form.points else 0
+        empty = next((k for k in range(padded) if np.nan_to_num(frames[len(frames) - 1 - k]).any()), padded)
+        frames, analog = frames[: len(frames) - empty], analog[:, : analog.shape[1] - empty * form.analog_per_frame]
+    unit, unsaid = _unit(reader)
     return _Content(
         frames,
-        _labels(reader, count),
-        float(reader.point_rate),
-        str(unit.string_value).strip() if unit is not None else "mm",
-        np.concatenate(analog, axis=1) if analog and reader.analog_used else np.zeros((0, 0)),
-        [str(label).strip() for label in reader.analog_labels] if reader.analog_used else [],
-        float(reader.analog_rate),
-        frozenset(label for kind in MODEL_OUTPUTS for label in _strings(reader, kind)),
-        remarks,
+        _labels(reader, form.points),
+        form.fps,
+        unit,
+        analog,
+        [str(label).strip() for label in reader.analog_labels] if form.analog_channels else [],
+        form.fps * form.analog_per_frame,
+        frozenset(label for kind in _output_lists(reader) for label in _strings(reader, kind)),
+        (*said, *unsaid, *remarks),
     )
 
 
-# The header counts frames in 16 bits, so recordings of 65,536 frames and more are counted elsewhere, or wrongly. All the counts
-# that a file may hold are looked at; the one that the size of the file bears out is taken, else what the size says.
-def _length(reader: Any, size: int) -> tuple[int, tuple[str, ...]]:
-    """How many frames the file holds, and what was noticed; FacesynthError where it is cut off."""
-    word = 4 if reader.point_scale < 0 else 2
-    each = word * (4 * int(reader.point_used) + int(reader.analog_used) * int(reader.analog_per_frame))
-    room = size - BLOCK * (int(reader.header.data_block) - 1)
-    whole = room // each if each else 0
-    stated = sorted(_stated_lengths(reader), reverse=True)
-    for length in stated:
-        if 0 < length <= whole and room - length * each < BLOCK + each:
-            return length, ()
-    if stated and min(stated) > 0 and max(stated) > whole and not any(length >= FULL for length in stated):
-        raise FacesynthError(f"is cut off: it states {max(stated)} frames and holds {whole}; copy it again")
-    counts = range(whole, max(whole - BLOCK // max(each, 1) - 2, FULL), -1)
-    wrapped = next((count for count in counts for length in stated if length < FULL and (count - length) % (FULL + 1) == 0), None)
-    if whole > FULL and (wrapped is not None or FULL in stated):
-        count = wrapped or whole
-        return count, (f"the header cannot count its {count} frames; the size of the file tells them",)
-    fitting = [length for length in stated if 0 < length <= whole]
-    if fitting:
-        return fitting[0], ()
-    return whole, (f"the header states no length that the file bears out; it holds {whole} frames",)
+def _unit(reader: Any) -> tuple[str, tuple[str, ...]]:
+    """The unit of the points, and what is said where the file states none."""
+    stated = next(iter(_strings(reader, "UNITS")), "")
+    said = stated.strip(" -?.").lower()
+    return ("mm", ("the file states no unit; the points were taken as mm",)) if said in NO_UNIT else (stated, ())
 
 
-def _stated_lengths(reader: Any) -> set[int]:
-    """Every count of frames in the file."""
-    lengths = {int(reader.header.last_frame) - int(reader.header.first_frame) + 1}
-    ends = [reader.get(f"TRIAL:ACTUAL_{which}_FIELD") for which in ("START", "END")]
-    if all(end is not None and len(end.bytes) >= 4 for end in ends):
-        first, last = (int(words[0]) + (int(words[1]) << 16) for words in (end.uint16_array for end in ends))
-        lengths.add(last - first + 1)
-    for name in ("LONG_FRAMES", "FRAMES"):
-        parameter = reader.get(f"POINT:{name}")
-        if parameter is not None and len(parameter.bytes) >= 2:
-            stated = parameter.float_value if len(parameter.bytes) >= 4 else parameter.uint16_value
-            lengths |= {int(stated)} if np.isfinite(stated) else set()
-    return lengths
-
-
-def _of_length(kind: type, length: int) -> type:
-    """The library's reader, which reads so many frames."""
-    return type("ReaderOfLength", (kind,), {"first_frame": 1, "last_frame": length})
+def _output_lists(reader: Any) -> list[str]:
+    """Names of the parameters that list what a model computed; programs may add to the usual ones, and say so."""
+    added = [name.upper() for name in _strings(reader, "TYPE_GROUPS") if name.upper() not in POINT_LISTS]
+    return [*MODEL_OUTPUTS, *(name for name in dict.fromkeys(added) if name not in MODEL_OUTPUTS)]
 
 
 def _labels(reader: Any, count: int) -> list[str]:
@@ -231,7 +196,8 @@ def _labels(reader: Any, count: int) -> list[str]:
 def _strings(reader: Any, name: str) -> list[str]:
     """A list of names in the group of points; beyond 255 it goes on in LABELS2 and so on."""
     parts = (reader.get(f"POINT:{name}{number}") for number in ("", *range(2, 10)))
-    return [str(label).strip() for part in parts if part is not None and part.dimensions for label in part.string_array]
+    arrays = (np.ravel(part.string_array) for part in parts if part is not None and part.dimensions)
+    return [str(label).strip(" \0\t") for labels in arrays for label in labels]
 
 
 def _named(path: Path, labels: list[str], are_outputs: NDArray[np.bool_]) -> tuple[str, ...]:

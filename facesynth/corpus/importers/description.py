@@ -17,10 +17,26 @@ LAYOUT = "layout.yaml"
 FILES = "files"
 """The key of a layout file under which it says how files are written."""
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
-_SPELLED = {"um": ("µm", "μm", "micron", "microns"), "in": ("inch", "inches", '"', "''"), "ft": ("foot", "feet", "'")}
-_PREFIXES = {"um": "micro", "mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
+_SPELLED = {
+    **{"um": ("µm", "μm", "micron", "microns"), "in": ("inch", "inches", '"', "''"), "ft": ("foot", "feet", "'")},
+    **{"mm": ("mms",), "cm": ("cms",), "m": ("mtr", "mtrs")},
+}
+_PREFIXES = {
+    **{
+        "um": ("micro",),
+        "mm": ("milli", "mili", "milí"),
+        "cm": ("centi", "zenti", "centí"),
+        "dm": ("deci", "dezi", "decí"),
+        "m": ("",),
+    }
+}
+_METRES = ("metre", "meter", "mètre", "metro", "metr")
 SPELLINGS = {spelled: unit for unit, spellings in _SPELLED.items() for spelled in spellings} | {
-    f"{prefix}{metre}{many}": unit for unit, prefix in _PREFIXES.items() for metre in ("metre", "meter") for many in ("", "s")
+    f"{prefix}{metre}{many}": unit
+    for unit, prefixes in _PREFIXES.items()
+    for prefix in prefixes
+    for metre in _METRES
+    for many in ("", "s", "i")
 }
 """Other ways to write the units."""
 AXES = "xyz"
@@ -110,8 +126,9 @@ class Description:
 
 def unit_mm(unit: str) -> float | None:
     """Millimetres of a unit, in any of its usual spellings; None for what is none."""
-    plain = unit.strip().strip("[]().").lower()
-    return UNITS_MM.get(SPELLINGS.get(plain, plain))
+    words = [word for word in re.split(r"[\s\[\](){}.,;|]+", unit.lower().replace("(s)", "s")) if word]
+    known = {SPELLINGS.get(word, word) for word in words}
+    return UNITS_MM.get(known.pop()) if len(known) == 1 else None
 
 
 def turned(points: NDArray[np.float64], axes: str) -> NDArray[np.float64]:

@@ -120,12 +120,10 @@ def _table(path: Path, asked: Asked) -> Reading:
 
 
 def _with_gaps(path: Path, reading: Reading) -> Reading:
-    """A table's markers with gaps where it holds numbers for them, its curves with ARKit's weights as shares."""
+    """A table's points with gaps where it holds numbers for them, its curves with ARKit's weights as shares."""
     motion = reading.motion
     if motion.layout.kind == "curves":
         return _with_shares(path, reading)
-    if motion.layout.kind != "markers":
-        return reading
     points, said = open_gaps(motion.points)
     frames = points.reshape(motion.frames.shape)
     opened = motion_of_arrays(path, frames, motion.fps, motion.layout, motion.head, motion.eyes)

@@ -83,13 +83,16 @@ def _single(signal: NDArray[np.floating] | None) -> NDArray[np.float32] | None:
 
 
 def open_gaps(points: NDArray[np.floating]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
-    """Markers [T, K, 3] with NaN where programs wrote a number for a gap, and what is said of it."""
+    """Points [T, K, 3 or 2] with NaN where programs wrote a number for a gap, and what is said of it."""
     far = filled_in(points)
     near = placeholders(points, far)
     far &= ~by_blocks(lambda some: np.asarray(np.isnan(some).any(axis=2)), points, bool)
     ways = (
-        (far, "are 0, 0, 0 or far from the face, as programs write gaps"),
+        (far, "are {zeros} or far from the face, as programs write gaps"),
         (near, "stand exactly still outside of the face while others move, as numbers that programs write for gaps"),
     )
-    said = tuple(f"{np.count_nonzero(mask)} samples {what}: they are gaps" for mask, what in ways if mask.any())
+    zeros = ", ".join("0" * points.shape[2])
+    said = tuple(
+        f"{np.count_nonzero(mask)} samples {what.format(zeros=zeros)}: they are gaps" for mask, what in ways if mask.any()
+    )
     return (np.where((far | near)[..., None], np.nan, points), said) if said else (points, ())
