@@ -67,7 +67,9 @@ def in_seconds(segments: Sequence[Segment], duration_s: float | None) -> tuple[l
     whole = all(time == int(time) for _, *times in segments for time in times)
     if duration_s is None or not whole or last < FAR_BEYOND * duration_s:
         return list(segments), ()
-    unit = min(UNITS_S, key=lambda name: abs(np.log(max(last * UNITS_S[name], 1e-12) / duration_s)))
+    first = segments[0][1]
+    length = last - first if first > last / 2 else last  # what begins so late was cut out of a longer file
+    unit = min(UNITS_S, key=lambda name: abs(np.log(max(length * UNITS_S[name], 1e-12) / duration_s)))
     seconds = [(label, start * UNITS_S[unit], end * UNITS_S[unit]) for label, start, end in segments]
     return seconds, (f"its times go up to {last:.0f}: they were taken as {unit}",)
 

@@ -10,7 +10,7 @@ from facesynth.inference.phones import SILENCE
 from facesynth.inference.speech import PhoneTrack
 from facesynth.speech.label_lines import NUMBER, in_seconds, line_segments
 from facesynth.speech.phone_labels import label_remarks, notation_of
-from facesynth.speech.praat import read_grid
+from facesynth.speech.praat import Grid, read_grid
 from facesynth.speech.segments import TOUCHING_S, Segment, phone_track, segments_of, with_confidences
 from facesynth.speech.tiers import following, tiers_of
 from facesynth.speech.unknown_labels import with_stand_ins
@@ -42,12 +42,12 @@ def read_labelled(path: str | Path, duration_s: float | None = None, speaker: st
         return _from_lines(path, duration_s)
     grid = read_grid(path)
     phones, words, confidences, remarks = tiers_of(grid, path, speaker)
-    begin_s = _offset_s(grid.start_s, grid.end_s, duration_s)
+    begin_s, end_s = _span_s(grid, phones.intervals, duration_s)
     segments, mended = following(_shifted(phones.intervals, begin_s))
     said = following(_shifted(words.intervals if words else (), begin_s))[0]
     spoken = tuple((word.strip(), start_s, end_s) for word, start_s, end_s in said if not is_silence_mark(word))
     sure = _shifted(confidences.intervals, begin_s) if confidences else []
-    known, unread = _track(path, segments, grid.end_s - begin_s)
+    known, unread = _track(path, segments, end_s)
     track, unsure = _with_confidences(known, sure)
     labels = label_remarks(label for label, _, _ in segments)
     told = (*_encoded(grid.encoding), *remarks, *_moved(begin_s), *mended, *labels, *unread, *unsure)
@@ -123,6 +123,18 @@ def _offset_s(start_s: float, end_s: float, duration_s: float | None) -> float:
         return 0.0
     beside_s = abs(end_s - start_s - duration_s)
     return start_s if beside_s <= SAME_LENGTH_S and beside_s < abs(end_s - duration_s) else 0.0
+
+
+def _span_s(grid: Grid, intervals: Sequence[Segment], duration_s: float | None) -> tuple[float, float]:
+    """What is taken off all times, and where the labels then end: as the file's head says, else as its intervals lie."""
+    spans = [(grid.start_s, grid.end_s), *([(intervals[0][1], intervals[-1][2])] if intervals else [])]
+    head, own = spans[0], spans[-1]
+    if own[0] < head[0] - TOUCHING_S or own[1] > head[1] + TOUCHING_S:  # the head is of another cut
+        head = own
+    if duration_s is not None and head[1] > duration_s + SAME_LENGTH_S and not _offset_s(*head, duration_s):
+        head = own if _offset_s(*own, duration_s) else head
+    begin_s = _offset_s(*head, duration_s)
+    return begin_s, head[1] - begin_s
 
 
 def _shifted(segments: Iterable[Segment], begin_s: float) -> list[Segment]:

@@ -14,7 +14,7 @@ _PHONES = re.compile(r"phone(?:me|mic|tic)?s?|(?<![a-z])ph(?:n|on)?s?(?![a-z])|(
 _WORDS = re.compile(r"words?|(?<![a-z])tokensalign|^ort(?:-mau)?(?![a-z])|(?<![a-z])orthograph(?:y|ic)")
 """As the Montreal aligner, ELAN, WebMAUS and SPPAS call them."""
 _CONFIDENCES = re.compile(r"confidences?")
-_BETWEEN = " -_@:./|#,;&"
+_BETWEEN = " \t\u00a0\u202f-\u2010\u2011\u2012\u2013\u2014\u2212_@:\uff1a./|#,;&+=~\u00b7\u30fb"
 """Between the name of a speaker and that of a kind of tier."""
 
 NO_LENGTH_S = 1e-6
@@ -87,12 +87,19 @@ def _is_phone(label: str, notation: Notation) -> bool:
 
 
 def _by_speaker(tiers: Sequence[Tier], kind: re.Pattern[str]) -> dict[str, Tier]:
-    """Tiers of intervals of a kind by their speaker's name; empty where the tier names none."""
+    """Tiers of intervals of a kind by their speaker's name; empty where the tier names none.
+
+    The kind is a word of a tier's name, the last one that is any kind; only where no tier has such a word, a part of one.
+    """
     found: dict[str, Tier] = {}
     spelt: dict[str, str] = {}
-    for tier in tiers:
-        match = kind.search(tier.name.lower())
-        if match is None or tier.of_points:
+    intervals = [tier for tier in tiers if not tier.of_points]
+    matches = {tier.name: _as_word(tier.name, kind) for tier in intervals}
+    if not any(matches.values()):
+        matches = {tier.name: kind.search(tier.name.lower()) for tier in intervals}
+    for tier in intervals:
+        match = matches[tier.name]
+        if match is None:
             continue
         rest = f"{tier.name[: match.start()].rstrip(_BETWEEN)} {tier.name[match.end() :].lstrip(_BETWEEN)}"
         name = re.sub(r"^[(\[{]+|[)\]}]+$", "", rest.strip(_BETWEEN)).strip(_BETWEEN)
@@ -103,6 +110,26 @@ def _by_speaker(tiers: Sequence[Tier], kind: re.Pattern[str]) -> dict[str, Tier]
             spelt.setdefault(name.lower(), name)
         found[name] = tier
     return found
+
+
+def _as_word(name: str, kind: re.Pattern[str]) -> re.Match[str] | None:
+    """Where a kind is a word of a tier's name: not within the name of a Persephone, nor before the word of another kind."""
+    words = [
+        (match, pattern is kind)
+        for pattern in (_PHONES, _WORDS, _CONFIDENCES)
+        for match in pattern.finditer(name.lower())
+        if _begins_word(name, match.start()) and _ends_word(name, match.end())
+    ]
+    last, is_kind = max(words, key=lambda word: word[0].start(), default=(None, False))
+    return last if is_kind else None
+
+
+def _begins_word(name: str, place: int) -> bool:
+    return not place or not name[place - 1].isalpha() or (name[place - 1].islower() and name[place].isupper())
+
+
+def _ends_word(name: str, place: int) -> bool:
+    return place >= len(name) or not name[place].isalpha() or (name[place - 1].islower() and name[place].isupper())
 
 
 def _chosen(spoken: dict[str, Tier], path: Path, speaker: str | None) -> tuple[str, tuple[str, ...]]:

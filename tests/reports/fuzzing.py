@@ -1,4 +1,4 @@
-"""Valid motion files with one thing changed, read in a process whose memory and time are limited.
+"""Valid files with one thing changed, read in a process whose memory and time are limited.
 
 python fuzzing.py FOLDER TRIALS KIND...   prints what came of each kind, as JSON.
 """
@@ -14,13 +14,20 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from c3d_files import content as content_of_c3d
+from c3d_files import face, file
+from fuzzing_files import c3d_changed, grid_changed, head_changed, places_of, whole_heads
+from grids import PHONES, WORDS, long_grid
 from scipy.io import savemat
 
 from facesynth.corpus.importers.formats import read
+from facesynth.face.rig.own_head import load_own_head
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.speech.textgrid import read_labelled
 
-KINDS = ("livelink", "table", "npz", "mat", "beat", "c3d", "openface")
+MOTION = ("livelink", "table", "npz", "mat", "beat", "c3d", "openface", "c3d fields")
+KINDS = (*MOTION, "textgrid", "head")
 MOST_BYTES, MOST_S, MOST_LETTERS = 1 << 30, 10, 600
 CELLS = (
     " ",
@@ -47,7 +54,13 @@ ODD = (None, -1, 0, 1, 1e300, "x", "", [], {}, [[]], True, "1", float("nan"), 2*
 
 
 def whole(kind, folder):
-    """The bytes of a valid file of a kind."""
+    """The bytes of a valid file of a kind; of heads those of each kind."""
+    if kind == "head":
+        return whole_heads(folder)
+    if kind == "textgrid":
+        return long_grid([("words", WORDS), ("A - phones", PHONES)]).encode()
+    if kind == "c3d fields":
+        return content_of_c3d(file(face(40)))
     path, rng = folder / f"whole.{suffix(kind)}", np.random.default_rng(3)
     weights = rng.random((40, 52))
     if kind == "livelink":
@@ -78,13 +91,20 @@ def whole(kind, folder):
 
 
 def suffix(kind):
-    return {"livelink": "csv", "table": "csv", "beat": "json", "openface": "csv"}.get(kind, kind)
+    suffixes = {"livelink": "csv", "table": "csv", "beat": "json", "openface": "csv", "c3d fields": "c3d"}
+    return {**suffixes, "textgrid": "TextGrid", "head": "glb"}.get(kind, kind)
 
 
 def changed(kind, content, rng):
-    """The file with one thing changed."""
+    """A file with one thing changed, and its suffix; content: of a valid file, of heads those of each kind."""
+    if kind == "textgrid":
+        return grid_changed(rng)
+    if kind == "head":
+        return head_changed(content, rng), suffix(kind)
+    if kind == "c3d fields":
+        return c3d_changed(rng), suffix(kind)
     if rng.random() < 0.1:
-        return cut_or_grown(content, rng)
+        return cut_or_grown(content, rng), suffix(kind)
     ways = {
         "livelink": table_changed,
         "table": table_changed,
@@ -92,7 +112,7 @@ def changed(kind, content, rng):
         "npz": npz_changed,
         "beat": json_changed,
     }
-    return ways.get(kind, words_changed)(content, rng)
+    return ways.get(kind, words_changed)(content, rng), suffix(kind)
 
 
 def cut_or_grown(content, rng):
@@ -128,8 +148,8 @@ def table_changed(content, rng):
 def npz_changed(content, rng):
     if rng.random() < 0.4:
         return words_changed(content, rng)
-    with zipfile.ZipFile(io.BytesIO(content)) as file:
-        members = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
     name = str(rng.choice(sorted(members)))
     array = np.load(io.BytesIO(members[name]))
     real = array if array.dtype.kind == "f" else np.ones((2, 3))
@@ -145,9 +165,9 @@ def npz_changed(content, rng):
     else:
         del members[name]
     made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED if rng.random() < 0.5 else zipfile.ZIP_STORED) as file:
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED if rng.random() < 0.5 else zipfile.ZIP_STORED) as archive:
         for key, value in members.items():
-            file.writestr(key, value)
+            archive.writestr(key, value)
     return made.getvalue()
 
 
@@ -157,14 +177,6 @@ def json_changed(content, rng):
     holder, key = places[rng.integers(len(places))]
     holder[key] = ODD[rng.integers(len(ODD))]
     return json.dumps(document).encode()
-
-
-def places_of(value):
-    """Every place of a document whose value can be changed."""
-    keys = value.keys() if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    for key in keys:
-        yield value, key
-        yield from places_of(value[key])
 
 
 def words_changed(content, rng):
@@ -195,34 +207,46 @@ def tried(kind, content, path):
     path.write_bytes(content)
     try:
         with np.errstate(all="ignore"):
-            reading = read(path, fps=None if kind in ("livelink", "openface") else 30.0)
+            require_right(kind, path)
     except FacesynthError as error:
         assert "\n" not in str(error), str(error)
         assert len(str(error)) < MOST_LETTERS + len(str(path)), str(error)[:2000]
         return False
+    return True
+
+
+def require_right(kind, path):
+    """AssertionError where what is read is none of its kind."""
+    if kind == "textgrid":
+        assert np.isfinite(read_labelled(path, 1.0).phones.ends_s).all()
+        return
+    if kind == "head":
+        assert np.isfinite(load_own_head(path).rest_mm).all()
+        return
+    reading = read(path, fps=None if kind in ("livelink", "openface") else 30.0)
     motion = reading.motion
     assert motion.frames.shape == (len(motion), motion.layout.channels), motion.frames.shape
     assert not np.isinf(motion.frames).any()
     assert 0 < motion.fps < 100000, motion.fps
     assert all("\n" not in remark for remark in reading.remarks)
-    return True
 
 
 def main(folder, trials, kinds):
     signal.signal(signal.SIGALRM, too_slow)
     told = {}
     for kind in kinds:
-        content, rng, path = whole(kind, folder), np.random.default_rng(trials), folder / f"changed.{suffix(kind)}"
-        assert tried(kind, content, path), kind
+        content, rng = whole(kind, folder), np.random.default_rng(trials)
+        for one in content if isinstance(content, list) else [content]:
+            assert tried(kind, one, folder / f"changed.{suffix(kind)}"), kind
         now = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (now + MOST_BYTES, resource.RLIM_INFINITY))
         facts = {"read": 0, "refused": 0, "slowest_s": 0.0, "failed": []}
         for trial in range(trials):
-            odd = changed(kind, content, rng)
+            odd, ending = changed(kind, content, rng)
             begun = time.process_time()
             signal.setitimer(signal.ITIMER_REAL, 6 * MOST_S)  # a machine may be busy; processor time is looked at below
             try:
-                facts["read" if tried(kind, odd, path) else "refused"] += 1
+                facts["read" if tried(kind, odd, folder / f"changed.{ending}") else "refused"] += 1
             except (Exception, TooSlow) as error:
                 facts["failed"].append(f"trial {trial}: {type(error).__name__}: {error}"[:300])
             signal.setitimer(signal.ITIMER_REAL, 0)

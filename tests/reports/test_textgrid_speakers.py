@@ -7,6 +7,8 @@ from bringing import added, checked, corpus_of, lay_down, run, spoken
 from grids import long_grid, put
 
 from facesynth.corpus import Corpus
+from facesynth.inference.errors import FacesynthError
+from facesynth.speech.textgrid import read_labelled
 
 ANNA = [("B", 0.0, 0.5), ("AA1", 0.5, 1.0)]
 BELA = [("S", 0.0, 0.5), ("IY1", 0.5, 1.0)]
@@ -17,6 +19,18 @@ NAMES = [
     ("words (Anna)", "phones (Anna)", "words (Bela)", "phones (Bela)"),
     ("ORT-MAU_Anna", "MAU_Anna", "ORT-MAU_Bela", "MAU_Bela"),
     ("word@Anna", "phon@Anna", "word@Bela", "phon@Bela"),
+]
+OTHER_NAMES = [
+    ("{} \N{EN DASH} words", "{} \N{EN DASH} phones", "Anna", "Bela"),
+    ("{}\N{EM DASH}words", "{}\N{EM DASH}phones", "Anna", "Bela"),
+    ("{}\N{NO-BREAK SPACE}-\N{NO-BREAK SPACE}words", "{}\N{NO-BREAK SPACE}-\N{NO-BREAK SPACE}phones", "Anna", "Bela"),
+    ("words::{}", "phones::{}", "Anna", "Bela"),
+    ("{} - words", "{} - phones", "Wordsworth", "Woodward"),
+    ("{} - words", "{} - phones", "Telephone", "Room"),
+    ("{} words", "{} phones", "microphone 1", "microphone 2"),
+    ("{}Words", "{}Phones", "Stephon", "Persephone"),
+    ("{} - words", "{} - phones", "Phone", "Words"),
+    ("{} - words", "{} - phones", "\N{LATIN CAPITAL LETTER L WITH STROKE}ucja", "\N{CJK UNIFIED IDEOGRAPH-674E}"),
 ]
 
 
@@ -37,6 +51,20 @@ def test_speak_wants_one_chosen_and_says_what_that_one_says(tmp_path, talker, na
         assert bela["mouthClose"].max() < 0.01
     code, _, said = run("speak", talker, sound, "-o", tmp_path / "o.npz", "--speaker", "Cleo")
     assert (code, "unknown speaker 'Cleo'" in said) == (2, True)
+
+
+@pytest.mark.parametrize("names", OTHER_NAMES)
+def test_speakers_whose_names_look_like_kinds_of_tiers_and_other_signs_between(tmp_path, names):
+    words, phones, first, second = names
+    named = tiers([words.format(first), phones.format(first), words.format(second), phones.format(second)])
+    for order in (named, named[::-1]):
+        path = put(tmp_path / "a.TextGrid", long_grid(order))
+        with pytest.raises(FacesynthError, match="2 speakers") as refused:
+            read_labelled(path, 1.0)
+        assert f"({', '.join((first, second)[:: 1 if order is named else -1])})" in str(refused.value)
+        for speaker, said, word in ((first, ("b", "aa"), "bah"), (second, ("s", "iy"), "see")):
+            found = read_labelled(path, 1.0, speaker)
+            assert (found.phones.labels, [name for name, _, _ in found.words]) == (said, [word])
 
 
 def test_add_wants_one_chosen_and_takes_words_and_phones_of_that_one(tmp_path):

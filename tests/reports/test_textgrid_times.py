@@ -35,6 +35,27 @@ def test_lines_of_start_end_label_too(tmp_path, talker):
     assert any("begin at 10 s" in line for line in facts["remarks"])
 
 
+@pytest.mark.parametrize(
+    ("head", "tiers_by_s", "told"), [((10.0, 11.0), 0.0, False), ((0.0, 1.0), 10.0, True), ((0.0, 11.0), 10.0, True)]
+)
+def test_a_head_that_is_of_another_cut_than_its_intervals(tmp_path, talker, head, tiers_by_s, told):
+    sound = lay_down(tmp_path / "session", "a", 1.0)
+    grid = put(tmp_path / "a.TextGrid", long_grid([("phones", shifted(PHONES, tiers_by_s))], *head))
+    curves, facts = spoken(talker, sound, tmp_path, "--phones", grid)
+    assert closing(curves) == pytest.approx(0.6, abs=0.021)
+    assert any("begin at 10 s" in line for line in facts["remarks"]) == told
+
+
+@pytest.mark.parametrize("write", ["{:.0f} {:.0f}", "{:.3f} {:.3f}"])
+def test_lines_of_a_longer_file_in_milliseconds_and_with_decimal_commas(tmp_path, talker, write):
+    sound, scale = lay_down(tmp_path / "session", "a", 1.0), 1000 if ":.0f" in write else 1
+    times = [(write.format(scale * (10 + start), scale * (10 + end)), label) for label, start, end in PHONES]
+    lines = "".join(f"{time}\t{label}\n".replace(".", ",") for time, label in times)
+    curves, facts = spoken(talker, sound, tmp_path, "--phones", put(tmp_path / "a.lab", lines))
+    assert closing(curves) == pytest.approx(0.6, abs=0.021)
+    assert any("begin at 10 s" in line for line in facts["remarks"])
+
+
 def test_the_account_tells_and_words_move_too(tmp_path):
     corpus, sound = corpus_of(tmp_path), lay_down(tmp_path / "session", "a", 1.0)
     put(sound.with_suffix(".TextGrid"), moved(10.0))

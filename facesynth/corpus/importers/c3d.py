@@ -87,7 +87,7 @@ def _size(frames: NDArray[np.float64], unit: str) -> list[str]:
 
 
 def _of_model(labels: list[str], listed: frozenset[str]) -> NDArray[np.bool_]:
-    """Which points are outputs: listed under their own name, in any case, else with a subject that one of list and label states."""
+    """Which points are outputs: listed under their own name, in any case, else with a subject that one of both states."""
     lists, names = {name.lower() for name in listed}, [label.lower() for label in labels]
     unmatched = lists - set(names)
     bare = {name for name in unmatched if ":" not in name}

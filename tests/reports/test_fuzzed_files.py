@@ -1,4 +1,4 @@
-"""Motion files with one thing changed: read, or refused in one line; never a traceback, a crash, a hang or a gigabyte."""
+"""Files with one thing changed: read, or refused in one line; never a traceback, a crash, a hang or a gigabyte."""
 
 import json
 import os
