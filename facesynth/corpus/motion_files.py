@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.corpus.importers.description import Written
+from facesynth.corpus.importers.timed import at_steady_rate
 from facesynth.corpus.npz import read_npz
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Layout
@@ -115,9 +116,11 @@ def read_csv(
         remarks = [f"columns that the layout does not have were left out: {shortened(others)}"] if others else []
     if time is None and only_own_rate:
         raise FacesynthError(f"{path} does not state its rate: give it (--fps), or a column {TIME}")
-    if time is not None:
-        fps = _rate(path, table[:, columns.index(time)] * (0.001 if time.lower().endswith("ms") else 1.0), fps)
     frames = table[:, places]
+    if time is not None:
+        times_s = table[:, columns.index(time)] * (0.001 if time.lower().endswith("ms") else 1.0)
+        frames, fps, said = _at_times(path, frames, times_s, fps)
+        remarks += said
     if layout.dimension > 1:
         frames = written.placed(layout.points(frames)).reshape(frames.shape)
     try:
@@ -157,12 +160,23 @@ def _plain(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
-def _rate(path: Path, times_s: NDArray[np.float64], fps: float) -> float:
-    """The rate of times that may be rounded to milliseconds: the corpus' own if it can be, else a usual one, else their mean."""
+def _at_times(
+    path: Path, frames: NDArray[np.float64], times_s: NDArray[np.float64], fps: float
+) -> tuple[NDArray[np.floating], float, list[str]]:
+    """Frames [T, C] at a steady rate, that rate, and what was done: lost rows leave gaps, doubled ones are read once."""
+    again = np.flatnonzero((np.diff(times_s) == 0) & (np.nan_to_num(frames[1:]) == np.nan_to_num(frames[:-1])).all(axis=1)) + 1
+    remarks = [f"{len(again)} of {len(frames)} rows are there twice; each frame was read once"] if len(again) else []
+    frames, times_s = np.delete(frames, again, axis=0), np.delete(times_s, again)
     steps = np.diff(times_s)
-    if not len(steps) or not (steps > 0).all() or np.abs(steps - steps.mean()).max() > 0.5 * steps.mean():
-        raise FacesynthError(f"{path}: the column {TIME} does not go up in even steps; resample the motion first")
-    mean = float(1 / steps.mean())
+    if len(steps) and (steps > 0).all() and np.abs(steps - steps.mean()).max() <= 0.5 * steps.mean():
+        return frames, _rate(times_s, fps), remarks
+    placed, rate, said = at_steady_rate(path, frames, times_s)
+    return placed, rate, [*remarks, *said]
+
+
+def _rate(times_s: NDArray[np.float64], fps: float) -> float:
+    """The rate of times that may be rounded to milliseconds: the corpus' own if it can be, else a usual one, else their mean."""
+    mean = float(1 / np.diff(times_s).mean())
     for rate in (fps, *sorted(USUAL_FPS, key=lambda rate: abs(rate - mean))):
         if np.abs(times_s - times_s[0] - np.arange(len(times_s)) / rate).max() <= ROUNDING_S:
             return float(rate)

@@ -13,6 +13,8 @@ from facesynth.encoding import text_of
 from facesynth.inference.errors import FacesynthError
 
 _COMMA_NUMBER = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
+EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)
+"""A first line that says which sign parts the cells, as Excel writes and reads it."""
 HEAD_BYTES = 1 << 20
 """Hold the rows that names are looked for in."""
 _LONGEST_QUOTE = 60
@@ -54,8 +56,10 @@ def is_number(text: str, decimal: str = ".") -> bool:
 def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]]:
     try:
         with io.StringIO(text_of(path, HEAD_BYTES if most is not None else None), newline="") as file:
-            sign = separator or separator_of(file.readline())
-            file.seek(0)
+            first = file.readline()
+            said = EXCEL.fullmatch(first.strip())
+            sign = separator or (said[1] if said else separator_of(first))
+            file.seek(len(first) if said else 0)
             reader = csv.reader(file, delimiter=sign, skipinitialspace=sign == " ")
             rows: list[list[str]] = []
             for row in reader:

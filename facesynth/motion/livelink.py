@@ -19,6 +19,8 @@ from facesynth.encoding import decoded
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.motion.cells import EXCEL
+from facesynth.motion.timecode import PARTS_OF_A_SECOND, RATES, read_timecodes
 
 TIMECODE, COUNT = "Timecode", "BlendshapeCount"
 ANGLES = tuple(f"{what}{angle}" for what in ("Head", "LeftEye", "RightEye") for angle in ("Yaw", "Pitch", "Roll"))
@@ -36,16 +38,14 @@ DOUBTFUL = 3.0
 FEW_OVER = 0.02
 """A larger share of weights over 1 is more than some that were captured a little beyond it."""
 CLIPPED = 1.001
-RATES = (24, 25, 30, 48, 50, 60, 90, 100, 120, 240)
-"""Frames that time codes count in a second."""
-SLOWEST = 23
-"""Frame numbers below it tell no rate: a take of half a second has such low ones too."""
-WHOLE_SECOND = (30, 60)
-"""So many frames within one second are taken for all of it, and told; fewer or others do not show the rate."""
-NOON_S, DAY_S = 43200, 86400
 LARGEST_GAP = 50
 """Frames for each row: a table with larger gaps has damaged time codes."""
-_TIMECODE = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d)([:;.,])(\d{2,3})(?:[.,](\d+))?")
+LARGEST_ANGLE_RAD = 1.8
+"""Neither a head nor an eye turns so far before a camera: larger angles are degrees."""
+SAME_CODE = 0.9
+"""Share of the time codes that must stand in as many rows for these to be parts of a frame."""
+_NUMBER = re.compile(r"\s*[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?\s*%?\s*")
+_BARE_DROP_FRAME = re.compile(r"(?<![\d\"])(\d{1,3}:\d\d:\d\d;\d{2,3}(?:[.,]\d+)?)(?=;)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def is_live_link(path: Path) -> bool:
     """Whether a table has the columns of a take, whatever their order, case and encoding."""
     try:
         with open(path, "rb") as file:
-            names = {_spelled(name).lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:1])[0]}
+            names = {_spelled(name).lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:2])[0]}
     except (OSError, UnicodeDecodeError, csv.Error, IndexError):
         return False
     shapes = sum(name.lower() in names for name in WEIGHTS)
@@ -106,22 +106,60 @@ def read_take(path: Path, fps: float | None = None) -> Take:
     names = [_spelled(name) for name in header]
     timecodes = [row[names.index(TIMECODE)].strip() for row in rows]
     columns = [k for k, name in enumerate(names) if name not in (TIMECODE, COUNT)]
+    others = [k for k in columns if names[k] not in (*WEIGHTS, *ANGLES)]
+    left_out = [k for k in others if not all(_is_share(row[k]) for row in rows)]
+    columns = [k for k in columns if k not in left_out]
+    if left_out:
+        remarks.append(f"columns that are no weights were left out: {', '.join(header[k][:40] for k in left_out[:5])}")
     values = _numbers(path, rows, columns)
+    if any(row[k].endswith("%") for row in rows[:1] for k in columns):
+        remarks.append("its cells are in per cent: they were divided by 100")
     named = tuple(names[k] for k in columns)
     values, said = as_shares(path, values, [name not in ANGLES for name in named])
-    times_s, counted = _times(path, timecodes, fps)
+    values, of_angles = _in_radians(values, [name in ANGLES for name in named])
+    times_s, counted = read_timecodes(path, timecodes, fps)
+    times_s, of_parts = _parted(times_s, values, counted)
     frames, rate = _placed(path, timecodes, times_s, counted, fps)
-    remarks += said + _lost_and_doubled(frames, values)
+    remarks += said + of_angles + of_parts + _lost_and_doubled(frames, values)
     if fps is None and len({code[:8] for code in timecodes}) == 1:
         remarks.append(f"the time codes stay within one second: they were taken for a whole second of {counted} fps")
     return Take(tuple(timecodes), named, values, frames, rate, tuple(remarks))
+
+
+def _is_share(cell: str) -> bool:
+    """Whether a cell holds a number as weights are."""
+    return _NUMBER.fullmatch(cell) is not None and abs(_number(cell)) <= PER_CENT
+
+
+def _in_radians(values: Floats, are_angles: list[bool]) -> tuple[Floats, list[str]]:
+    """Values whose angles are radians, and what was done."""
+    largest = float(np.abs(values[:, are_angles]).max(initial=0.0))
+    if largest <= LARGEST_ANGLE_RAD:
+        return values, []
+    said = f"angles of head and eyes go up to {largest:.3g}: they were taken as degrees"
+    return np.where(are_angles, np.deg2rad(values), values), [said]
+
+
+# Where rows come twice as fast as the time code counts, each code stands in two rows, whose values differ.
+def _parted(times_s: Floats, values: Floats, counted: int) -> tuple[Floats, list[str]]:
+    """Times [R] of rows that share a time code throughout, spread over the frame of that code; and what was done."""
+    starts = np.flatnonzero(np.diff(times_s, prepend=-np.inf) != 0)
+    lengths = np.diff([*starts, len(times_s)])
+    usual = int(np.median(lengths))
+    moved = np.flatnonzero(np.diff(times_s) == 0)
+    differing = (values[moved] != values[moved + 1]).any(axis=1).mean() if len(moved) else 0.0
+    if usual < 2 or (lengths == usual).mean() < SAME_CODE or differing < SAME_CODE:
+        return times_s, []
+    place = np.arange(len(times_s)) - np.repeat(starts, lengths)
+    said = f"each time code stands in {usual} rows: they were taken for {usual * counted} frames a second"
+    return times_s + place / (usual * counted), [said]
 
 
 def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
     """Names of the columns, the rows below them, and what was noticed."""
     try:
         text, encoding = decoded(path.read_bytes())
-        header, *rows = _cells(text.splitlines()) or [[]]
+        header, *rows = _without_empty_columns(_cells(text.splitlines())) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
     lower = [_spelled(name).lower() for name in header]
@@ -144,11 +182,25 @@ def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
 
 
 def _cells(lines: Sequence[str]) -> list[list[str]]:
-    """Rows of a table with commas, semicolons or tabs; a comma within a cell is a decimal one."""
+    """Rows of a table with commas, semicolons or tabs, with decimal points or commas."""
+    said = EXCEL.fullmatch(lines[0].strip()) if lines else None
+    lines = lines[1:] if said else lines
     first = lines[0] if lines else ""
-    sign = next((sign for sign in (";", "\t") if first.count(sign) > first.count(",")), ",")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=sign) if row]
-    return rows if sign == "," else [rows[0], *([cell.replace(",", ".") for cell in row] for row in rows[1:])] if rows else []
+    sign = said[1] if said else next((sign for sign in (";", "\t") if first.count(sign) > first.count(",")), ",")
+    text = "\n".join(lines)
+    text = _BARE_DROP_FRAME.sub(r'"\1"', text) if sign == ";" else text
+    return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=sign) if row]
+
+
+def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
+    """Rows without what stands behind a sign at the end of every line."""
+    while rows and rows[0] and not rows[0][-1] and all(len(row) == len(rows[0]) and not row[-1] for row in rows):
+        rows = [row[:-1] for row in rows]
+    return rows
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[\s_-]", "", name)
 
 
 def _variants(name: str) -> Iterator[str]:
@@ -159,16 +211,24 @@ def _variants(name: str) -> Iterator[str]:
             yield f"{name.removesuffix(side)}_{side[0]}"
 
 
-_SPELLED = {variant: name for name in (TIMECODE, COUNT, *WEIGHTS, *ANGLES) for variant in _variants(name.lower())}
+_SPELLED = {_letters(variant): name for name in (TIMECODE, COUNT, *WEIGHTS, *ANGLES) for variant in _variants(name.lower())}
 
 
 def _spelled(name: str) -> str:
-    return _SPELLED.get(name.lower(), name)
+    """A column's name as the app writes it, whatever its case and the signs within and before it (`blendShape1.jaw_open`)."""
+    plain = re.sub(r"^.*[.:|]|^arkit[_ ]?", "", name.strip().lower())
+    return _SPELLED.get(_letters(name.lower())) or _SPELLED.get(_letters(plain), name)
+
+
+def _number(cell: str) -> float:
+    """A number with a decimal point or comma; per cent are shares."""
+    plain = cell.replace(",", ".")
+    return float(plain[:-1]) / 100 if plain.endswith("%") else float(plain)
 
 
 def _numbers(path: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     try:
-        values = np.array([[row[k] for k in columns] for row in rows], np.float64)
+        values = np.array([[_number(row[k]) for k in columns] for row in rows], np.float64).reshape(len(rows), len(columns))
     except ValueError as error:
         raise FacesynthError(f"{path} holds a value that is no number ({error})") from None
     if not np.isfinite(values).all():
@@ -187,43 +247,13 @@ def as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floa
     if highest > PER_CENT:
         doubt = ", which is doubtful: if they are exaggerated shares, clip them at 1" if highest < DOUBTFUL else ""
         return np.where(are_weights, values / 100, values), [f"{said}: they were taken as per cent and divided by 100{doubt}"]
+    lowest = float(weights.min(initial=0.0))
+    under = [f"weights go down to {lowest:g}: those under 0 are taken as 0"] if lowest < 1 - CLIPPED else []
     doubt = f", which is doubtful for {over:.0%} of all: if they are per cent of a quiet face, divide by 100"
-    return values, [f"{said}: those over 1 are taken as 1{doubt if over > FEW_OVER else ''}"] if highest > CLIPPED else []
-
-
-def _times(path: Path, timecodes: list[str], fps: float | None) -> tuple[Floats, int]:
-    """[R] times in seconds, rising over midnight, and how many frames the time codes count in a second."""
-    fields = [_TIMECODE.fullmatch(text) for text in timecodes]
-    for row, (text, match) in enumerate(zip(timecodes, fields, strict=True), start=2):
-        if match is None:
-            raise FacesynthError(f"{path} row {row}: {text[:40]!r} is no time code; wanted HH:MM:SS:FF.mmm, or HH:MM:SS;FF")
-    found = [match for match in fields if match]
-    parts = np.array([[int(match[k]) for k in (1, 2, 3, 5)] for match in found], np.int64)
-    seconds = parts[:, :3] @ np.array([3600, 60, 1])
-    highest = int(parts[:, 3].max()) + 1
-    if fps is None and (highest < SLOWEST or (len(np.unique(seconds)) < 2 and highest not in WHOLE_SECOND)):
-        raise FacesynthError(f"{path} is too short to show its frame rate; give it (--fps)")
-    shown = max(highest, int(np.ceil(fps - 0.05)) if fps and len(np.unique(seconds)) < 2 else highest)
-    counted = min((rate for rate in RATES if rate >= shown), default=shown)
-    parted = parts[:, 3] + np.array([float(f"0.{match[6] or 0}") for match in found])
-    if any(match[4] == ";" for match in found):
-        return _over_midnight(_drop_frame(parts, counted) / (counted * 1000 / 1001)), counted
-    return _over_midnight(seconds + parted / counted), counted
-
-
-def _drop_frame(parts: NDArray[np.int64], counted: int) -> Floats:
-    """[R] frames since midnight of drop-frame time codes [R, 4].
-
-    Numbers 0 and 1 of 30 (0 to 3 of 60) are left out at each minute but every tenth, so that they stay with the clock.
-    """
-    hours, minutes, seconds, frames = parts.T
-    whole = 60 * hours + minutes
-    dropped = counted // 15 * (whole - whole // 10)
-    return (((60 * whole + seconds) * counted + frames) - dropped).astype(np.float64)
-
-
-def _over_midnight(times_s: Floats) -> Floats:
-    return times_s + DAY_S * np.cumsum(np.diff(times_s, prepend=times_s[0]) < -NOON_S)
+    return values, [
+        *([f"{said}: those over 1 are taken as 1{doubt if over > FEW_OVER else ''}"] if highest > CLIPPED else []),
+        *under,
+    ]
 
 
 # Steps between time codes are whole multiples of a frame, give or take what the app's clock trembles. Each step is rounded by
@@ -247,18 +277,21 @@ def _placed(
         return np.arange(len(times_s)), fps
     usual = float(np.median(forward))
     count = np.rint(steps / usual).sum()
-    rate = _exact(float(count / (times_s[-1] - times_s[0])), counted)
+    span_s = float(times_s[-1] - times_s[0])
+    rate = _exact(float(count) / span_s, counted, span_s)
     frames = np.rint((times_s - times_s[0]) * rate).astype(np.int64)
     if frames[-1] > LARGEST_GAP * len(frames) + 1000:
         raise FacesynthError(f"{path}: the time codes jump by hours, from {timecodes[0]} to {timecodes[-1]}; export it again")
     return np.maximum.accumulate(frames), fps if fps is not None and abs(fps / rate - 1) < 1e-3 else rate
 
 
-def _exact(rate: float, counted: int) -> float:
-    """The rate of film or television that is meant."""
-    exact = [usual * slow for usual in (*RATES, counted) for slow in (1.0, 1000 / 1001)]
+def _exact(rate: float, counted: int, span_s: float) -> float:
+    """The rate of film or television that is meant by time codes that are rounded to parts of a second."""
+    parts = () if counted in PARTS_OF_A_SECOND else (counted,)
+    exact = [usual * slow for usual in (*RATES, *parts) for slow in (1.0, 1000 / 1001)]
     nearest = min(exact, key=lambda usual: abs(usual - rate))
-    return nearest if abs(nearest - rate) < 1e-4 * rate else rate
+    rounding = 1 / (counted * span_s) if counted in PARTS_OF_A_SECOND else 0.0
+    return nearest if abs(nearest / rate - 1) < max(1e-4, rounding) else rate
 
 
 def _lost_and_doubled(frames: NDArray[np.int64], values: Floats) -> list[str]:

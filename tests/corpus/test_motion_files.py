@@ -82,8 +82,8 @@ def test_csv_of_curves(tmp_path):
         ("a.x,a.y\n", "no frames"),
         ("a.x,a.y\n1,inf\n", "infinite"),
         ("", "unknown column 'a.x'"),
-        ("time_s,a.x,a.y\n0,1,1\n0,1,1\n", "even steps"),
-        ("time_s,a.x,a.y\n0,1,1\n0.1,1,1\n0.5,1,1\n", "even steps"),
+        ("time_s,a.x,a.y\n0,1,1\n0,2,1\n", "does not lie after the one before"),
+        ("time_s,a.x,a.y\n0,1,1\n0.1,1,1\n0.05,1,1\n", "does not lie after the one before"),
     ],
 )
 def test_bad_csv_is_one_clear_error(tmp_path, content, message):

@@ -323,3 +323,11 @@ def test_every_preset_says_where_its_names_are_from():
         text = resources.files("facesynth.face.rig").joinpath("presets", f"{name}.yaml").read_text(encoding="utf-8")
         assert "# Names from: https://" in text
         assert "jawOpen" in text
+
+
+def test_points_that_lie_beyond_any_head_are_refused(tmp_path):
+    def far(document, _data):
+        document.nodes[-1].translation = [0.0, 1e30, 0.0]
+
+    with pytest.raises(FacesynthError, match=r"has points more than 10 km from its face"):
+        load_own_head(head(tmp_path / "a.glb", far))

@@ -30,6 +30,10 @@ ODD = {
     "ARKit's case": {"names": tuple(name[0].lower() + name[1:] for name in NAMES), "first": ("Timecode", "BlendShapeCount")},
     "UTF-16 with semicolons": {"encoding": "utf-16", "sign": ";", "decimal": ","},
     "a letter for the side": {"names": tuple(re.sub("(Left|Right)$", lambda side: f"_{side[0][0]}", name) for name in NAMES)},
+    "snake case": {"names": tuple(re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in NAMES)},
+    "words": {"names": tuple(re.sub("(?<=[a-z])(?=[A-Z])", " ", name) for name in NAMES)},
+    "names behind those of a node": {"names": tuple(f"blendShape1.{name[0].lower()}{name[1:]}" for name in NAMES)},
+    "names behind ARKit": {"names": tuple(f"ARKit_{name}" for name in NAMES)},
     "another order": {"order": np.random.default_rng(1).permutation(63)},
 }
 
@@ -46,6 +50,54 @@ def test_the_same_take_in_every_dress(tmp_path, kind):
     np.testing.assert_allclose(got.head, wanted.head, atol=1e-7)
     np.testing.assert_allclose(got.eyes, wanted.eyes, atol=1e-7)
     np.testing.assert_allclose(read_livelink(path).values, VALUES, atol=1e-9)
+
+
+def lines_of(header, cell):
+    """A take line by line, each number as `cell` writes it."""
+    return [header, *(f"{code},61,{','.join(map(cell, row))}" for code, row in zip(CODES, VALUES, strict=True))]
+
+
+HEADER = ",".join(["Timecode", "BlendshapeCount", *NAMES])
+PLAIN = lines_of(HEADER, "{:.10f}".format)
+WRITTEN = {
+    "decimal commas in quotes": (lines_of(HEADER, lambda value: f'"{value:.10f}"'.replace(".", ",")), ""),
+    "a sign at the end of each line": ([f"{line}," for line in PLAIN], ""),
+    "Excel's line on the sign": (["sep=,", *PLAIN], ""),
+    "a name in a column": (["Subject," + PLAIN[0], *(f"iPhone,{line}" for line in PLAIN[1:])], "left out: Subject"),
+    "a count of frames": (["Frame," + PLAIN[0], *(f"{k},{line}" for k, line in enumerate(PLAIN[1:]))], "left out: Frame"),
+}
+
+
+@pytest.mark.parametrize("kind", sorted(WRITTEN))
+def test_the_same_take_as_other_programs_write_it(tmp_path, kind):
+    lines, said = WRITTEN[kind]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert is_live_link(path)
+    reading, wanted = read(path), plain(tmp_path)
+    np.testing.assert_allclose(reading.motion.frames, wanted.frames, atol=1e-7)
+    np.testing.assert_allclose(reading.motion.head, wanted.head, atol=1e-7)
+    assert said in "".join(reading.remarks)
+    np.testing.assert_allclose(read_livelink(path).values, VALUES, atol=1e-9)
+
+
+def test_angles_in_degrees_and_weights_under_0_are_told(tmp_path):
+    degrees = np.concatenate([VALUES[:, :52], np.rad2deg(VALUES[:, 52:])], axis=1)
+    reading = read(write(tmp_path / "a.csv", CODES, degrees))
+    np.testing.assert_allclose(reading.motion.head, plain(tmp_path).head, atol=1e-6)
+    assert "they were taken as degrees" in reading.remarks[0]
+    under = read(write(tmp_path / "b.csv", CODES, np.where(np.arange(61) == 17, -VALUES, VALUES)))
+    assert under.motion.frames[:, :52].min() == 0
+    assert "those under 0 are taken as 0" in under.remarks[0]
+
+
+def test_per_cent_signs_are_read(tmp_path):
+    rows = [[f"{100 * value:.8f}%" for value in row[:52]] + [f"{value:.10f}" for value in row[52:]] for row in VALUES * 0.01]
+    lines = [HEADER, *(f"{code},61,{','.join(row)}" for code, row in zip(CODES, rows, strict=True))]
+    (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-8")
+    reading = read(tmp_path / "a.csv")
+    np.testing.assert_allclose(reading.motion.frames[:, :52], 0.01 * plain(tmp_path).frames[:, :52], atol=1e-7)
+    assert "per cent" in reading.remarks[0]
 
 
 def test_per_cent_is_told_and_divided(tmp_path):

@@ -17,7 +17,7 @@ def jaw(motion):
     return motion.frames[:, motion.layout.names.index("jawOpen")]
 
 
-@pytest.mark.parametrize("fps", [24, 25, 30000 / 1001, 30, 60000 / 1001, 60, 120])
+@pytest.mark.parametrize("fps", [12, 15, 20, 24, 25, 30000 / 1001, 30, 60000 / 1001, 60, 120])
 def test_lost_rows_are_gaps_at_their_time(tmp_path, fps):
     codes, values = timecodes_of(COUNT, fps), values_of(COUNT)
     lost = [40, 41, 42, 77, *range(120, 131)]
@@ -60,6 +60,75 @@ def test_drop_frame_time_codes_stay_with_the_clock(tmp_path, rate):
     assert reading.motion.fps == pytest.approx(rate * 1000 / 1001, abs=1e-9)
     assert len(reading.motion) == len(codes)
     assert reading.remarks == ()
+
+
+def drop_frame(count, rate=30, first=58 * 30):
+    """Numbers of hours, minutes, seconds and frames of drop-frame time codes."""
+    skipped = rate // 15
+    for number in range(first, first + count):
+        minutes = next(m for m in range(60) if number < (m + 1) * 60 * rate - skipped * (m + 1 - (m + 10) // 10))
+        named = number + skipped * (minutes - minutes // 10)
+        yield named // (3600 * rate), named // (60 * rate) % 60, named // rate % 60, named % rate
+
+
+DROPPED = {
+    "semicolons throughout": ("{:02d};{:02d};{:02d};{:02d}", {}),
+    "a point before the frame, known by the numbers left out": ("{:02d}:{:02d}:{:02d}.{:02d}", {}),
+    "colons, known by the numbers left out": ("{:02d}:{:02d}:{:02d}:{:02d}", {}),
+    "in a table with semicolons": ("{:02d}:{:02d}:{:02d};{:02d}", {"sign": ";", "decimal": ","}),
+}
+
+
+@pytest.mark.parametrize("kind", DROPPED)
+def test_drop_frame_time_codes_in_other_spellings(tmp_path, kind):
+    form, table = DROPPED[kind]
+    codes, kept = [form.format(*parts) for parts in drop_frame(240)], np.setdiff1d(np.arange(240), [30, 31, 90])
+    reading = read(write(tmp_path / "a.csv", [codes[k] for k in kept], values_of(240)[kept], **table))
+    assert reading.motion.fps == pytest.approx(30000 / 1001, abs=1e-9)
+    assert np.array_equal(np.flatnonzero(np.isnan(jaw(reading.motion))), [30, 31, 90])
+    assert len(reading.motion) == 240
+
+
+@pytest.mark.parametrize("fps", [25, 30000 / 1001, 30, 60])
+@pytest.mark.parametrize("form", ["{:02d}:{:02d}:{:02d}.{:03d}", "{:02d}:{:02d}:{:02d}:{:03d}", "{:02d}:{:02d}:{:02d}.{:06d}"])
+def test_time_codes_that_count_thousandths_of_a_second(tmp_path, fps, form):
+    scale = 1_000_000 if "6d" in form else 1000
+    parts = [divmod(round((36000 + k / fps) * scale), scale) for k in range(COUNT)]
+    codes = [form.format(s // 3600, s // 60 % 60, s % 60, part) for s, part in parts]
+    kept = np.setdiff1d(np.arange(COUNT), [40, 41, 90])
+    reading = read(write(tmp_path / "a.csv", [codes[k] for k in kept], values_of(COUNT)[kept]))
+    assert reading.motion.fps == pytest.approx(fps, abs=1e-9)
+    assert np.array_equal(np.flatnonzero(np.isnan(jaw(reading.motion))), [40, 41, 90])
+
+
+def test_rows_twice_as_fast_as_the_time_code_counts(tmp_path):
+    codes = [code for code in timecodes_of(COUNT // 2, 30) for _ in range(2)]
+    reading = read(write(tmp_path / "a.csv", codes, values_of(COUNT)))
+    assert reading.motion.fps == 60
+    np.testing.assert_allclose(jaw(reading.motion), np.arange(COUNT) / COUNT, atol=1e-6)
+    assert reading.remarks == ("each time code stands in 2 rows: they were taken for 60 frames a second",)
+
+
+@pytest.mark.parametrize("fps", [25, 30000 / 1001, 60])
+@pytest.mark.parametrize("column", ["time_s", "time_ms"])
+def test_tables_with_times_lose_and_double_rows_too(tmp_path, fps, column):
+    from facesynth.motion.arkit_names import ARKIT_NAMES
+
+    values = values_of(COUNT)[:, :52]
+    values[:, 0] = np.arange(COUNT) / COUNT
+    times = 10 + np.arange(COUNT) / fps
+    times = np.round(times * 1000) if column == "time_ms" else times
+    lost = [40, 41, 42, 77, *range(120, 131)]
+    for rows in (np.setdiff1d(np.arange(COUNT), lost), np.sort([*range(COUNT), 10, 11, 90])):
+        table = np.column_stack([times, values])[rows]
+        np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=",".join([column, *ARKIT_NAMES]), comments="", fmt="%.6f")
+        reading = read(tmp_path / "a.csv")
+        assert reading.motion.fps == pytest.approx(fps, rel=1e-6)
+        assert len(reading.motion) == COUNT
+        seen = np.isfinite(reading.motion.frames[:, 0])
+        np.testing.assert_allclose(reading.motion.frames[seen, 0], (np.arange(COUNT) / COUNT)[seen], atol=1e-3)
+        assert len(reading.remarks) == 1
+        assert 0 <= reading.motion.frames[seen].min() <= reading.motion.frames[seen].max() <= 1
 
 
 def test_takes_over_midnight_and_trembling_clocks(tmp_path):

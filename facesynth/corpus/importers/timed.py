@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.gaps import LONGEST_S
-from facesynth.motion.irregular import ROUNDING_S, USUAL_FPS, read_at, steady_rate
+from facesynth.motion.irregular import ROUNDING_S, UNSTEADY, USUAL_FPS, read_at, steady_rate
 
 
 def at_steady_rate(path: Path, signal: Floats, times_s: Floats) -> tuple[NDArray[np.float32], float, tuple[str, ...]]:
@@ -20,12 +20,25 @@ def at_steady_rate(path: Path, signal: Floats, times_s: Floats) -> tuple[NDArray
     if len(times_s) < 2 or not np.isfinite(times_s).all() or (steps <= 0).any():
         row = int(np.argmax(~(steps > 0))) + 2 if len(steps) else 1
         raise FacesynthError(f"{path}: the time of frame {row} does not lie after the one before; cut the file there")
-    fps, even = steady_rate(times_s, float(1 / np.median(steps)))
     since_s = times_s - times_s[0]
+    fps, even = _rate(times_s)
     usual = min(USUAL_FPS, key=lambda rate: abs(rate - fps))
     fps = usual if np.abs(since_s * usual - np.rint(since_s * usual)).max() <= ROUNDING_S * usual else fps
     if even:
         return signal.astype(np.float32), fps, ()
     regular_s = np.arange(int((since_s[-1] + ROUNDING_S) * fps) + 1) / fps
     said = f"frames do not come at a steady rate: they were interpolated at their own times, at {fps:g} fps"
-    return read_at(signal, since_s, regular_s, LONGEST_S, ROUNDING_S), fps, (said,)
+    placed = read_at(signal, since_s, regular_s, LONGEST_S, ROUNDING_S)
+    lowest, highest = np.nanmin(signal, axis=0, initial=np.inf), np.nanmax(signal, axis=0, initial=-np.inf)
+    return np.clip(placed, lowest, highest).astype(np.float32), fps, (said,)  # splines swing beyond what was measured
+
+
+# Where frames were lost the other steps are all one frame, and those across the gaps are whole multiples of it.
+def _rate(times_s: Floats) -> tuple[float, bool]:
+    """A rate (Hz) at which frames at `times_s` [T] lose nothing, and whether they lie at regular times already."""
+    steps = np.diff(times_s)
+    usual = float(np.median(steps))
+    counts = np.rint(steps / usual)
+    if (counts >= 1).all() and np.abs(steps / usual - counts).max() <= UNSTEADY:
+        return float(counts.sum() / (times_s[-1] - times_s[0])), bool((counts == 1).all())
+    return steady_rate(times_s, 1 / usual)

@@ -22,6 +22,8 @@ TEXELS = 5
 FACE_MM = 150.0
 """Height of what a face's shapes move, from the brows to the chin."""
 LIKELY_FACE_MM = (70.0, 320.0)
+LARGEST_MM = 1e7
+"""No point of a head lies so far from its face."""
 M_PER_UNIT_MM = 1000.0
 MOVED_SHARE = 0.05
 """A vertex belongs to the face if a shape moves it by this share of the largest movement."""
@@ -230,6 +232,8 @@ def _placed(
     middle = (low + high) / 2
     neck = np.array([middle[0], low[1], low[2]]) if pivot is None else pivot
     rest = (vertices - middle) * unit_mm
+    if not np.abs(rest).max() < LARGEST_MM:
+        raise FacesynthError(f"{path} has points more than {LARGEST_MM / 1e6:g} km from its face; move or delete them")
     return OwnHead(
         path,
         rest.astype(np.float32),
