@@ -116,7 +116,7 @@ def read_csv(
         remarks = [f"columns that the layout does not have were left out: {shortened(others)}"] if others else []
     if time is None and only_own_rate:
         raise FacesynthError(f"{path} does not state its rate: give it (--fps), or a column {TIME}")
-    frames = table[:, places]
+    frames: NDArray[np.floating] = table[:, places]
     if time is not None:
         times_s = table[:, columns.index(time)] * (0.001 if time.lower().endswith("ms") else 1.0)
         frames, fps, said = _at_times(path, frames, times_s, fps)
@@ -161,7 +161,7 @@ def _plain(name: str) -> str:
 
 
 def _at_times(
-    path: Path, frames: NDArray[np.float64], times_s: NDArray[np.float64], fps: float
+    path: Path, frames: NDArray[np.floating], times_s: NDArray[np.float64], fps: float
 ) -> tuple[NDArray[np.floating], float, list[str]]:
     """Frames [T, C] at a steady rate, that rate, and what was done: lost rows leave gaps, doubled ones are read once."""
     again = np.flatnonzero((np.diff(times_s) == 0) & (np.nan_to_num(frames[1:]) == np.nan_to_num(frames[:-1])).all(axis=1)) + 1

@@ -119,7 +119,7 @@ class _Content:
     labels: list[str]
     fps: float
     unit: str
-    analog: NDArray[np.float64]
+    analog: NDArray[np.float32]
     """[channels, S]"""
     analog_labels: list[str]
     analog_rate: float

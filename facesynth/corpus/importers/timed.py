@@ -11,7 +11,9 @@ from facesynth.motion.gaps import LONGEST_S
 from facesynth.motion.irregular import ROUNDING_S, UNSTEADY, USUAL_FPS, read_at, steady_rate
 
 
-def at_steady_rate(path: Path, signal: Floats, times_s: Floats) -> tuple[NDArray[np.float32], float, tuple[str, ...]]:
+def at_steady_rate(
+    path: Path, signal: NDArray[np.floating], times_s: Floats
+) -> tuple[NDArray[np.float32], float, tuple[str, ...]]:
     """A signal [T, C] with frames at `times_s` [T] from its first time on, its rate, and what was noticed.
 
     FacesynthError where times go back. Frames that were lost leave gaps where they are longer than what is filled.
