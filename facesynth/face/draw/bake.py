@@ -8,7 +8,7 @@ from scipy import sparse
 
 from facesynth.atomic import atomic_path
 from facesynth.cache import cache_dir
-from facesynth.face.draw.albedo import inside_mouth, paint_skin, scalp, step
+from facesynth.face.draw.albedo import inside_mouth, paint_skin, scalp
 from facesynth.face.draw.camera import Camera
 from facesynth.face.draw.look import Eyeball, LitSphere, Look
 from facesynth.face.draw.occlusion import sky_visibility
@@ -18,11 +18,12 @@ from facesynth.face.draw.strands import Skin, Strands, grow_all, hair_volume_mm
 from facesynth.face.draw.subdivision import catmull_clark, refine_corners
 from facesynth.face.rig.anny import PARTS, head_folder, head_key
 from facesynth.face.rig.arkit_rig import Rig, pose
+from facesynth.face.rig.brows import step
 from facesynth.face.rig.markers import INNER_LIPS, MIDDLE_LIPS
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_all_arrays
 
-_VERSION = 2  # raise it whenever what is baked changes
+_VERSION = 3  # raise it whenever what is baked changes
 _MATERIALS = np.array([SKIN, EYE, EYE, TEETH, TEETH, TONGUE, HIDDEN, HIDDEN, HIDDEN, HIDDEN], np.uint8)
 _STRAND_FIELDS = ("lift_mm", "segments", "width_mm", "colour", "horizon", "raised_mm")
 _LIT = LitSphere(np.array([0.0, -30.0, 60.0]), 190.0)
@@ -56,6 +57,7 @@ def built_in_look(rig: Rig) -> Look:
         cap_mm=baked.cap_mm,
         eyes=(left, right),
         lips=rig.from_source(np.array(INNER_LIPS[MIDDLE_LIPS]).T),
+        furrows=True,
     )
 
 

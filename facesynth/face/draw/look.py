@@ -51,6 +51,9 @@ class Look:
     lips: NDArray[np.int64] | None = None
     """[2, P] facing vertices of the inner lips, upper and lower: between closed ones no light comes in."""
 
+    furrows: bool = False
+    """Whether places are those of the built-in head, on which lines of brow and forehead are drawn."""
+
     @property
     def vertex_count(self) -> int:
         """V."""

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from facesynth.face.draw.bake import built_in_look
 from facesynth.face.draw.camera import Camera
+from facesynth.face.draw.furrows import pushed_together, vertex_areas
 from facesynth.face.draw.light import KEY
 from facesynth.face.draw.look import Eyeball, LitSphere, Look
 from facesynth.face.draw.occlusion import orthographic, sky_visibility
@@ -107,6 +108,7 @@ class Renderer:
         self.look, self.size, self.camera = look, (int(size[0]), int(size[1])), camera or look.camera
         self._drawn = look.surface.quads[look.surface.material != HIDDEN]
         self._normal_quads = look.normal_quads
+        self._rest_areas = vertex_areas(look.surface.rest, self._normal_quads) if look.furrows else None
         self._grid = (-(-self.size[0] // TILE), -(-self.size[1] // TILE))
         self._backdrop, self._curve = backdrop(*self.size), display_curve()
         self._light = orthographic(KEY, *look.lit, _SHADOW_SIZE)
@@ -133,7 +135,7 @@ class Renderer:
         triangle_bins = bin_triangles(screen, self._drawn, *self._grid)
         hair, segment_bins = strands.result()
         eyes, mouth_mm = _eye_frames(look.eyes, posed), _mouth_mm(look.lips, posed)
-        shot = Shot(screen, position, normal, shadow.result(), self._light, eyes, self._camera_mm, mouth_mm)
+        shot = Shot(screen, position, normal, shadow.result(), self._light, eyes, self._camera_mm, mouth_mm, self._lost(position))
         picture = np.empty((self.size[1], self.size[0], 3), np.uint8)
         job = (look.surface, shot, hair, Bins(*triangle_bins, *segment_bins), self._backdrop, self._curve, picture)
         for done in [self._pool.submit(draw_tiles, chunk, *job) for chunk in self._chunks]:
@@ -160,6 +162,11 @@ class Renderer:
     def _normals(self, position: NDArray[np.float32]) -> NDArray[np.float32]:
         normal, welded = vertex_normals(position, self._normal_quads), self.look.welded
         return normal if welded is None else normal[welded]
+
+    def _lost(self, position: NDArray[np.float32]) -> NDArray[np.float32]:
+        if self._rest_areas is None:
+            return np.zeros(len(position), np.float32)
+        return pushed_together(position, self._normal_quads, self._rest_areas)
 
     def _shadow(self, position: NDArray[np.float32], normal: NDArray[np.float32]) -> NDArray[np.float32]:
         cap = self.look.cap_mm

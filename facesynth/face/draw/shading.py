@@ -10,12 +10,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from facesynth.face.draw.eye import eye_colour
+from facesynth.face.draw.furrows import furrow
 from facesynth.face.draw.light import reflect, smoothstep, unit
 from facesynth.face.draw.raster import barycentric
 from facesynth.face.draw.shadow import lit_share
 
 SKIN, EYE, TEETH, TONGUE, HIDDEN = range(5)
 """Materials; HIDDEN surfaces (the lashes' cards) are not drawn."""
+FURROW_DARK = 0.40
+"""How much of the light the bottom of a furrow loses."""
 OPEN_MM = 7.0
 """From this opening of the lips on the mouth is lit as if they were not there."""
 
@@ -53,6 +56,8 @@ class Shot(NamedTuple):
     """[3] position of the camera."""
     mouth_mm: NDArray[np.float32]
     """[1] opening of the lips: no light comes in between closed ones."""
+    lost: NDArray[np.float32]
+    """[N] how far skin is pushed together (`pushed_together`); none of it on heads whose furrows nobody drew."""
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -114,6 +119,12 @@ def _weigh(values: NDArray[Any], a: int, b: int, c: int, wb: float, wc: float) -
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _darker(red: float, green: float, blue: float, left: float) -> tuple[float, float, float]:
+    """A colour of skin of which a share of the light is left: red is lost least, as in all folds of skin."""
+    return red * (0.4 + 0.6 * left), green * left, blue * left
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArray[Any]) -> None:
     """Linear colours [>= K, 3] of K fragments (triangle, column, row), each seen at the middle of its pixel.
 
@@ -122,7 +133,7 @@ def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArra
     """
     quads, material, rest, texture = surface.quads, surface.material, surface.rest, surface.texture
     occlusion, cavity = surface.occlusion, surface.cavity
-    screen, position, normal, shadow, light, eyes, camera = (
+    screen, position, normal, shadow, light, eyes, camera, lost = (
         shot.screen,
         shot.position,
         shot.normal,
@@ -130,6 +141,7 @@ def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArra
         shot.light,
         shot.eyes,
         shot.camera,
+        shot.lost,
     )
     mouth = 0.12 + 0.88 * smoothstep(0.0, OPEN_MM, shot.mouth_mm[0])
     for k in range(len(fragments)):
@@ -148,6 +160,13 @@ def shade(surface: Surface, shot: Shot, fragments: NDArray[Any], colours: NDArra
         elif material[quad] == SKIN:
             s, t = (wb + wc, wc) if half == 0 else (wb, wb + wc)
             red, green, blue, gloss = _texel(texture, quad, s, t)
+            pushed = (1.0 - wb - wc) * lost[a] + wb * lost[b] + wc * lost[c]
+            if pushed > 0.05:
+                place = _weigh(rest, a, b, c, wb, wc)
+                deep, slope_x, slope_y = furrow(place[0], place[1], place[2], pushed)
+                n = unit(n[0] - slope_x, n[1] - slope_y, n[2])
+                sky *= 1.0 - FURROW_DARK * deep
+                red, green, blue = _darker(red, green, blue, 1.0 - FURROW_DARK * deep)
             colour = reflect((red, green, blue), n, v, key * reach, sky * reach, 1.0, gloss * reach, 5, sky * sky * reach)
         elif material[quad] == TEETH:
             colour = _teeth(_weigh(rest, a, b, c, wb, wc), n, v, key * reach * mouth, 0.75 * sky * reach * mouth)

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import Delaunay, cKDTree
 
-from facesynth.face.draw.albedo import brow_shade, hairline_mm, noise, step
+from facesynth.face.draw.albedo import brow_shade, hairline_mm, noise
+from facesynth.face.rig.brows import BROW_LENGTH_MM, BROW_START_MM, over_brow_mm, step
 
 Points = NDArray[np.float64]
 
 _HAIR_COLOUR = np.array([0.060, 0.036, 0.022])
-_BROW_COLOUR = np.array([0.050, 0.031, 0.021])
+_BROW_COLOUR = np.array([0.038, 0.024, 0.016])
 _LASH_COLOUR = np.array([0.020, 0.014, 0.012])
 
 
@@ -173,15 +174,15 @@ def _clumped(strands: Points, root: Points, rng: np.random.Generator) -> Points:
     return strands + pull * ((strands[mine] + 0.45 * (root - root[mine])[:, None]) - strands)
 
 
-def _brow_hair(skin: Skin, rng: np.random.Generator, count: int = 1500, steps: int = 4) -> Tufts:
+def _brow_hair(skin: Skin, rng: np.random.Generator, count: int = 1900, steps: int = 4) -> Tufts:
     """Hairs 5-8 mm long: upright by the nose, lying outwards along the arch."""
     root, normal = skin.sample(lambda p: brow_shade(p) ** 1.2, count, rng)
-    along_brow = np.clip((np.abs(root[:, 0]) - 10.5) / 41, 0, 1)
+    along_brow = np.clip((np.abs(root[:, 0]) - BROW_START_MM) / BROW_LENGTH_MM, 0, 1)
     outward = np.sign(root[:, 0])
     lean = np.stack(
         [outward * (0.25 + 1.0 * step(0.0, 0.35, along_brow)), 1.0 - 1.75 * step(0.05, 0.75, along_brow), -0.2 + 0 * outward], -1
     )
-    middle = np.sign(root[:, 1] - (15.2 + 9.2 * along_brow - 7.6 * along_brow**3))  # upper hairs lean down, lower ones up
+    middle = np.sign(over_brow_mm(root))  # upper hairs lean down, lower ones up
     lean[:, 1] -= 0.30 * middle * step(0.15, 0.5, along_brow)
     heading = _unit(_unit(lean) + 0.18 * normal + 0.10 * rng.normal(size=root.shape))
     length = rng.uniform(4.0, 7.5, len(root)) * (1 - 0.35 * along_brow)
@@ -190,7 +191,7 @@ def _brow_hair(skin: Skin, rng: np.random.Generator, count: int = 1500, steps: i
         moved = points[-1] + heading * (length / (steps - 1))[:, None]
         points.append(skin.kept_outside(moved, np.full(len(root), 0.35 + 0.25 * k)))
     along = np.linspace(0, 1, steps)
-    width = np.broadcast_to(0.24 * (1 - 0.8 * along), (len(root), steps)) * rng.uniform(0.7, 1.2, (len(root), 1))
+    width = np.broadcast_to(0.28 * (1 - 0.8 * along), (len(root), steps)) * rng.uniform(0.7, 1.2, (len(root), 1))
     colour = _BROW_COLOUR * np.broadcast_to(rng.uniform(0.6, 1.4, (len(root), 1)), (len(root), steps))[..., None]
     return Tufts(np.stack(points, axis=1), width, colour)
 

