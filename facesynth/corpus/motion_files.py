@@ -25,6 +25,7 @@ TIME = "time_s"
 TIMES = frozenset({TIME, "time", "seconds", "timestamp_s", "time_ms"})
 """Columns of times, in lower case; those that end in ms hold milliseconds."""
 ROUNDING_S = 0.001
+SAME_RATE = 1e-6
 
 
 def load_motion(path: str | Path, layout: Layout, fps: float, written: Written | None = None) -> tuple[Motion, tuple[str, ...]]:
@@ -162,16 +163,13 @@ def _plain(name: str) -> str:
 
 def _at_times(
     path: Path, frames: NDArray[np.floating], times_s: NDArray[np.float64], fps: float
-) -> tuple[NDArray[np.floating], float, list[str]]:
+) -> tuple[NDArray[np.floating], float, tuple[str, ...]]:
     """Frames [T, C] at a steady rate, that rate, and what was done: lost rows leave gaps, doubled ones are read once."""
-    again = np.flatnonzero((np.diff(times_s) == 0) & (np.nan_to_num(frames[1:]) == np.nan_to_num(frames[:-1])).all(axis=1)) + 1
-    remarks = [f"{len(again)} of {len(frames)} rows are there twice; each frame was read once"] if len(again) else []
-    frames, times_s = np.delete(frames, again, axis=0), np.delete(times_s, again)
     steps = np.diff(times_s)
     if len(steps) and (steps > 0).all() and np.abs(steps - steps.mean()).max() <= 0.5 * steps.mean():
-        return frames, _rate(times_s, fps), remarks
+        return frames, _rate(times_s, fps), ()
     placed, rate, said = at_steady_rate(path, frames, times_s)
-    return placed, rate, [*remarks, *said]
+    return placed, fps if abs(fps / rate - 1) < SAME_RATE else rate, said
 
 
 def _rate(times_s: NDArray[np.float64], fps: float) -> float:

@@ -20,6 +20,9 @@ LONG_SIZE = 28
 """Byte at which it does."""
 FIRST_CHUNK = 12
 """Byte at which the first part of the file begins."""
+NOTES = (b"LIST", b"bext", b"iXML", b"id3 ", b"ID3 ", b"cue ")
+"""Parts in which recorders keep titles and the like, some behind the sound."""
+LARGEST_NOTES = 1 << 20
 LARGEST_PADDING = 1 << 16
 """Zeros behind the sound that fill up a block of a disk."""
 
@@ -87,7 +90,7 @@ def find_samples(content: bytes | mmap.mmap) -> Samples | None:
             stop = start + size
             # the byte that makes a size even is not written by all
             whole = any(_ends_at(content, place, order) for place in {stop + size % 2, stop})
-            return Samples(start, min(stop, len(content)) if whole else len(content), size)
+            return Samples(start, min(stop, len(content)) if whole else _before_notes(content, start, order), size)
         at = start + size + size % 2
     return None
 
@@ -101,6 +104,12 @@ def _long_size(content: bytes | mmap.mmap, size: int) -> int:
     """Bytes of sound that a file states, where 32 bits may not hold them."""
     in_ds64 = size == 0xFFFFFFFF and content[:4] in LONG and content[FIRST_CHUNK : FIRST_CHUNK + 4] == b"ds64"
     return struct.unpack_from("<Q", content, LONG_SIZE)[0] if in_ds64 else size
+
+
+def _before_notes(content: bytes | mmap.mmap, start: int, order: str) -> int:
+    """The byte at which the sound ends: where a recorder's notes follow up to the end of the file, before these."""
+    places = (content.find(name, max(start, len(content) - LARGEST_NOTES)) for name in NOTES)
+    return min((at for at in places if at >= 0 and _ends_at(content, at, order)), default=len(content))
 
 
 def _ends_at(content: bytes | mmap.mmap, at: int, order: str) -> bool:

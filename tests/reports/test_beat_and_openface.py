@@ -46,6 +46,12 @@ def test_beat_in_per_cent_with_lost_frames_and_damage(tmp_path):
     beat(tmp_path / "b.json", times_s=times_s)
     gapped = read(tmp_path / "b.json").motion
     assert np.array_equal(np.flatnonzero(np.isnan(gapped.frames[:, 0])), np.arange(60, 90))
+    plain = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    plain["frames"] = [frame for frame in plain["frames"] for _ in range(2)]
+    (tmp_path / "d.json").write_text(json.dumps(plain), encoding="utf-8")
+    doubled = read(tmp_path / "d.json")
+    np.testing.assert_allclose(doubled.motion.frames[:, :51], weights, atol=1e-6)
+    assert "are there twice" in doubled.remarks[-1]
     for damage in (
         '{"frames": [{"weights": [1]}]}',
         '{"names": ["a"], "frames": []}',

@@ -97,6 +97,12 @@ def test_parts_after_the_sound_are_no_sound(tmp_path):
         sound = read_sound(path)
         assert len(sound.audio) == len(SOUND)
         assert sound.remarks == ()
+    soundfile.write(path, SOUND, RATE)
+    content = bytearray(path.read_bytes()[: 44 + 64000])
+    struct.pack_into("<I", content, 40, 0)  # never written, but the title behind the sound is there
+    path.write_bytes(content + b"iXML" + struct.pack("<I", 40) + bytes(40) + title)
+    sound = read_sound(path)
+    assert (len(sound.audio), "states 0 bytes of sound" in sound.remarks[0]) == (len(SOUND), True)
     soundfile.write(path, SOUND[:-1], RATE, subtype="PCM_U8")
     whole = path.read_bytes()[: 44 + len(SOUND) - 1]
     for end in (title, b"\0" + title, bytes(3000)):  # a missing byte that makes the size even, and a disk's block filled up

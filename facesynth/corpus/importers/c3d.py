@@ -204,7 +204,9 @@ def _named(path: Path, labels: list[str], are_outputs: NDArray[np.bool_]) -> tup
     """Every marker that a person named."""
     markers = [label for label, is_output in zip(labels, are_outputs, strict=True) if not is_output]
     named = [name for name in markers if name and not name.startswith("*")]
-    if not named or len(set(named)) != len(named):
+    if not named:
+        raise FacesynthError(f"{path} names none of its {len(markers)} markers; name them in the program that recorded them")
+    if len(set(named)) != len(named):
         raise FacesynthError(f"{path} names {len(set(named))} different markers of {len(named)}; name each of them once")
     return tuple(named)
 
