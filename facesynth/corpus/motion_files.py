@@ -1,5 +1,6 @@
 """Motion as other programs write it: NPZ and CSV, of any rate, with or without the head's motion in it."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,8 +23,12 @@ from facesynth.motion.resample import resample
 
 AXES = ("x", "y", "z")
 TIME = "time_s"
-TIMES = frozenset({TIME, "time", "seconds", "timestamp_s", "time_ms"})
-"""Columns of times, in lower case; those that end in ms hold milliseconds."""
+TIMES = frozenset({TIME, "time", "seconds", "timestamp_s", "timestamp", "time_ms", "timestamp_ms", "time_seconds"})
+"""Columns of times, in lower case and with `_` for all other signs (`Time (s)`); those that end in ms hold milliseconds."""
+NUMBERS = frozenset({"frame", "frames", "frame_number", "frame_no", "frame_id", "frame_index"})
+"""Columns that count frames, in the same spelling."""
+LARGEST_GAP = 50
+"""Frames for each row: a column of numbers with larger gaps counts something else."""
 ROUNDING_S = 0.001
 SAME_RATE = 1e-6
 
@@ -119,8 +124,11 @@ def read_csv(
         raise FacesynthError(f"{path} does not state its rate: give it (--fps), or a column {TIME}")
     frames: NDArray[np.floating] = table[:, places]
     if time is not None:
-        times_s = table[:, columns.index(time)] * (0.001 if time.lower().endswith("ms") else 1.0)
+        times_s = table[:, columns.index(time)] * (0.001 if _words(time).endswith("ms") else 1.0)
         frames, fps, said = _at_times(path, frames, times_s, fps)
+        remarks += said
+    elif (number := number_column(columns, wanted)) is not None:
+        frames, said = _at_numbers(frames, table[:, columns.index(number)])
         remarks += said
     if layout.dimension > 1:
         frames = written.placed(layout.points(frames)).reshape(frames.shape)
@@ -136,7 +144,17 @@ def time_column(columns: Sequence[str], written: Written, channels: Sequence[str
         if written.time not in columns:
             raise unknown("column of times", written.time, columns)
         return written.time
-    return next((name for name in columns if name.lower() in TIMES and name not in channels), None)
+    return next((name for name in columns if _words(name) in TIMES and name not in channels), None)
+
+
+def number_column(columns: Sequence[str], channels: Sequence[str] = ()) -> str | None:
+    """The column that counts frames, if there is one that is no channel."""
+    return next((name for name in columns if _words(name) in NUMBERS and name not in channels), None)
+
+
+def _words(name: str) -> str:
+    """A column's name in lower case, with `_` for all signs that are no letters."""
+    return re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
 
 
 def shortened(names: Sequence[str], most: int = 5) -> str:
@@ -170,6 +188,20 @@ def _at_times(
         return frames, _rate(times_s, fps), ()
     placed, rate, said = at_steady_rate(path, frames, times_s)
     return placed, fps if abs(fps / rate - 1) < SAME_RATE else rate, said
+
+
+def _at_numbers(frames: NDArray[np.floating], numbers: NDArray[np.float64]) -> tuple[NDArray[np.floating], tuple[str, ...]]:
+    """Frames [T, C] where their numbers say, NaN for those that are missing; as they are where the numbers count otherwise."""
+    steps = np.diff(numbers)
+    if not len(steps) or not (steps > 0).all() or (steps % steps.min() != 0).any() or (steps == steps.min()).all():
+        return frames, ()
+    places = ((numbers - numbers[0]) / steps.min()).astype(np.int64)
+    count = int(places[-1]) + 1
+    if count > LARGEST_GAP * len(frames):
+        return frames, ()
+    placed = np.full((count, frames.shape[1]), np.nan)
+    placed[places] = frames
+    return placed, (f"{count - len(frames)} of {count} frames have no row by their numbers: they are gaps",)
 
 
 def _rate(times_s: NDArray[np.float64], fps: float) -> float:

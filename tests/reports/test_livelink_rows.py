@@ -131,6 +131,21 @@ def test_tables_with_times_lose_and_double_rows_too(tmp_path, fps, column):
         assert 0 <= reading.motion.frames[seen].min() <= reading.motion.frames[seen].max() <= 1
 
 
+@pytest.mark.parametrize("column", ["Time (s)", "Timestamp [ms]", "Frame"])
+def test_columns_of_times_and_numbers_in_other_spellings(tmp_path, column):
+    from facesynth.motion.arkit_names import ARKIT_NAMES
+
+    kept = np.setdiff1d(np.arange(COUNT), [*range(50, 70), 90])
+    counted = {"Frame": 1 + np.arange(COUNT), "Time (s)": np.arange(COUNT) / 25, "Timestamp [ms]": 40 * np.arange(COUNT)}[column]
+    table = np.column_stack([counted, values_of(COUNT)[:, :52]])[kept]
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=",".join([column, *ARKIT_NAMES]), comments="", fmt="%.6f")
+    reading = read(tmp_path / "a.csv", fps=25 if column == "Frame" else None)
+    assert (reading.motion.fps, len(reading.motion)) == (25, COUNT)
+    assert np.isnan(reading.motion.frames[50:70]).all()
+    np.testing.assert_allclose(reading.motion.frames[kept], values_of(COUNT)[kept, :52], atol=1e-5)
+    assert len(reading.remarks) <= 2
+
+
 def test_takes_over_midnight_and_trembling_clocks(tmp_path):
     codes = timecodes_of(COUNT, start_s=86399.0)
     codes = [code.replace("24:", "00:", 1) if code.startswith("24:") else code for code in codes]

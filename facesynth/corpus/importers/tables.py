@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facesynth.corpus.importers.description import ORDER, Written
 from facesynth.corpus.importers.matlab import load_mat
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
-from facesynth.corpus.motion_files import read_csv, shortened, time_column
+from facesynth.corpus.motion_files import number_column, read_csv, shortened, time_column
 from facesynth.inference.errors import FacesynthError, unknown
 from facesynth.inference.layout import Kind, Layout
 from facesynth.inference.long_arrays import by_blocks
@@ -139,7 +139,7 @@ def _named_columns(path: Path, written: Written) -> Layout:
     """Curves, or points whose columns end in .x, .y and .z, as the first line of a CSV names them."""
     names = read_names(path, written.separator, written.decimal)
     time = time_column(names, written)
-    return _layout_of(path, [name for name in names if name != time])
+    return _layout_of(path, [name for name in names if name not in (time, number_column(names))])
 
 
 def _named_array(path: Path, frames: NDArray[Any], otherwise: Layout | None) -> Layout:
