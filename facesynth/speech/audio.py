@@ -45,6 +45,8 @@ BLOCK = 1 << 20
 """Samples read or resampled at once, about."""
 WITH_PACKETS = frozenset({"MPEG", "MP3", "OGG", "FLAC"})
 """Formats of libsndfile's that FFmpeg reads better: by their packets, whatever their headers state, and where pages are lost."""
+PACKETED = (b"OggS", b"fLaC", b"ID3", b"\xff\xfb", b"\xff\xf3")
+"""How most files of these begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +197,9 @@ def _read_plain(path: Path) -> Recorded | None:
     try:
         with ExitStack() as opened:
             stored = opened.enter_context(open(path, "rb"))
+            if stored.read(FIRST_CHUNK).startswith(PACKETED):
+                return None
+            stored.seek(0)
             source, remarks = _mended(opened, stored)
             # by its path where it needs no mending: libsndfile seeks before the beginning of damaged files
             with soundfile.SoundFile(path if source is stored else source) as file:
