@@ -11,7 +11,7 @@ import click
 
 from facesynth.cli.options import as_json, seeded, show, spread_over
 from facesynth.cli.types import FILE
-from facesynth.inference.errors import FacesynthError
+from facesynth.inference.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
     from facesynth.corpus import Corpus
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=FILE, help="Model file; METHOD.safetensors in this folder otherwise.")
 @click.option("--config", type=FILE, help="YAML file of settings; KEY=VALUE goes before it.")
 @click.option("--split", type=click.Choice(["all", "train"]), default="all", show_default=True, help="Sentences to learn from.")
+@click.option("--emotion", "only", help="Learn from recordings of this emotion alone; all otherwise.")
 @click.option("--device", help="auto (the default), cpu, cuda or mps; `device` of --config otherwise.")
 @seeded
 @spread_over("--jobs", 1, "METHOD emotion: voices at once; 1 otherwise.")
@@ -38,6 +39,7 @@ def train(
     output: Path | None,
     config: Path | None,
     split: str,
+    only: str | None,
     device: str | None,
     seed: int,
     as_json: bool,
@@ -63,6 +65,8 @@ def train(
     place = device_of(device or str(chosen.pop("device", "auto")))
     path = output or Path(f"{method}.safetensors")
     if method == "emotion":
+        if only is not None:
+            raise FacesynthError("a detector of emotions learns from all of them; leave out --emotion")
         from facesynth.cli.emotion import train_detector
 
         train_detector(corpus, chosen, path, seed if split == "train" else None, workers=workers, as_json=as_json)
@@ -73,7 +77,7 @@ def train(
         _tell_made(path, method, len(made.fitted_layout.names), as_json=as_json)
         return
     method_class(method).from_config(chosen)  # a wrong setting is told before a corpus is read
-    recordings = _recordings(corpus, seed if split == "train" else None)
+    recordings = _recordings(corpus, seed if split == "train" else None, only)
     start = time.perf_counter()
     model = learn(method_class(method), recordings, chosen, seed=seed, device=place)
     seconds = time.perf_counter() - start
@@ -81,13 +85,24 @@ def train(
     _tell_learned(model, recordings, path, save_face(recordings, path), seconds, as_json=as_json)
 
 
-def _recordings(corpus: Path, seed: int | None) -> Corpus:
-    """What is learned from: all recordings, or with a seed those of the sentences to train on."""
+def _recordings(corpus: Path, seed: int | None, only: str | None) -> Corpus:
+    """What is learned from: all recordings, or those of one emotion; with a seed those of the sentences to train on."""
     from facesynth.corpus import Corpus
 
     recordings = Corpus.open(corpus)
     _require_speech(recordings)
+    if only is not None:
+        recordings = _felt(recordings, only)
     return recordings if seed is None else recordings.split(seed)[0]
+
+
+def _felt(recordings: Corpus, emotion: str) -> Corpus:
+    """Those that were recorded in one emotion."""
+    ids = [name for name in recordings.ids if recordings.record(name).emotion == emotion]
+    if not ids:
+        there = sorted({recordings.record(name).emotion for name in recordings.ids})
+        raise unknown("emotion of a recording", emotion, there)
+    return recordings.subset(ids)
 
 
 def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | None, seconds: float, *, as_json: bool) -> None:

@@ -1,12 +1,15 @@
 """What the command line says where recordings or key poses teach no head, no eyes and no expression: one line each."""
 
+import json
 import sys
 
 import pytest
+from click.testing import CliRunner
 from corpora import twin_corpus
 from nodding import nodding, nodding_corpus
 
 from facesynth.cli import main
+from facesynth.cli.train import train
 from facesynth.methods.registry import create
 from facesynth.speech.audio import save_wav
 from facesynth.speech.textgrid import write_textgrid
@@ -60,6 +63,15 @@ def test_fewer_than_two_takes_of_a_head(refused, tmp_path, method):
 def test_a_single_emotion(refused, tmp_path, emotions, wanted):
     corpus = twin_corpus(tmp_path / "one", emotions, sentences=3)
     assert wanted in refused("train", "expression", corpus.path, "-o", tmp_path / "m.safetensors")
+
+
+def test_recordings_of_one_emotion_alone_are_learned_from_where_there_are_any(refused, tmp_path):
+    corpus, path = twin_corpus(tmp_path / "twins", ("neutral", "happy"), sentences=3), tmp_path / "m.safetensors"
+    done = CliRunner().invoke(train, ["phone_mean", str(corpus.path), "--emotion", "happy", "--json", "-o", str(path)])
+    assert json.loads(done.output)["utterances"] == len(corpus) / 2
+    wanted = "unknown emotion of a recording 'hapy'; did you mean happy?"
+    assert wanted in refused("train", "phone_mean", corpus.path, "--emotion", "hapy", "-o", path)
+    assert "learns from all of them" in refused("train", "emotion", corpus.path, "--emotion", "happy", "-o", path)
 
 
 def test_an_emotion_without_its_neutral_twin(refused, tmp_path):
