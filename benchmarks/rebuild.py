@@ -20,7 +20,7 @@ from typing import Any
 
 from cards import RECORDINGS, ROOT
 
-from facesynth.inference.folder import CARD, MANIFEST
+from facesynth.inference.folder import CARD, MANIFEST, place_of
 from facesynth.zoo.card import read_card
 from facesynth.zoo.shelf import PACKAGED
 
@@ -49,7 +49,7 @@ def same(folder: Path, places: Mapping[str, str], place: Path) -> bool:
     for line in lines:
         run(line, own)
     made = own / folder.relative_to(ROOT)
-    differ = [path.name for path in sorted(made.iterdir()) if not alike(path, folder / path.name)]
+    differ = [path.name for path in sorted(made.iterdir()) if not alike(path, place_of(folder, path.name))]
     print(f"{folder.name}: {'differs in ' + ', '.join(differ) if differ else 'the same'}", flush=True)
     return not differ
 

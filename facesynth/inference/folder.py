@@ -90,15 +90,24 @@ def stated_by_manifest(folder: Path) -> Iterator[None]:
 
 
 def open_folder(path: str | Path) -> Folder:
-    """Read the manifest and compare the hash of every file with it; FacesynthError names the file that is wrong."""
+    """Read the manifest and compare the hash of every file with it; FacesynthError names the file that is wrong.
+
+    What several models have alike, such as the network that hears phones, may lie once, beside their folders.
+    """
     folder, contents = Path(path), {}
     with stated_by_manifest(folder):
         manifest = _manifest(folder / MANIFEST)
         for name, wanted in manifest["files"].items():
             if Path(name).name != name:
                 raise FacesynthError(f"{folder / MANIFEST} names {name!r}, which is not a file of this folder")
-            contents[name] = checked_bytes(folder / name, wanted)
+            contents[name] = checked_bytes(place_of(folder, name), wanted)
     return Folder(folder, manifest, contents)
+
+
+def place_of(folder: Path, name: str) -> Path:
+    """Where a file of a model lies: in its folder, or beside it where only there."""
+    own, shared = folder / name, folder.parent / name
+    return shared if shared.is_file() and not own.exists() else own
 
 
 def checked_bytes(path: Path, wanted: Any) -> bytes:

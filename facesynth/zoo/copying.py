@@ -28,10 +28,12 @@ def copy_packaged(model: Path, output: Path, *, changed: bool) -> dict[str, Any]
         )
     if output.exists() and (not output.is_dir() or any(output.iterdir())):
         raise FacesynthError(f"{output} is there and not empty; name a new folder for {model}")
-    open_folder(folder)
+    contents = open_folder(folder).contents
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent) as beside:
         part = Path(shutil.copytree(folder, Path(beside) / output.name))
+        for name, content in contents.items():  # some of them lie beside the folder, for several models
+            (part / name).write_bytes(content)
         if output.exists():
             output.rmdir()
         part.rename(output)

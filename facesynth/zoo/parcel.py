@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from facesynth.atomic import atomic_path
 from facesynth.hashing import hash_file
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.folder import CARD, MANIFEST, open_folder
+from facesynth.inference.folder import CARD, MANIFEST, open_folder, place_of
 from facesynth.progress import track
 from facesynth.zoo.shelf import Entry, entry_of, names, pulled_path
 
@@ -31,7 +31,7 @@ def push(folder: Path, to: Path) -> tuple[Path, str]:
     target = to / f"{model.name}{SUFFIX}"
     with atomic_path(target) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as parcel:
         for name in sorted([*open_folder(folder).contents, MANIFEST, CARD]):
-            parcel.writestr(zipfile.ZipInfo(name, _MOMENT), (folder / name).read_bytes(), zipfile.ZIP_DEFLATED)
+            parcel.writestr(zipfile.ZipInfo(name, _MOMENT), place_of(folder, name).read_bytes(), zipfile.ZIP_DEFLATED)
     return target, hash_file(target)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from facesynth.cache import cache_dir
 from facesynth.inference.errors import unknown
-from facesynth.inference.folder import CARD, MANIFEST, open_folder
+from facesynth.inference.folder import CARD, MANIFEST, open_folder, place_of
 from facesynth.methods.registry import load_trained
 from facesynth.zoo.card import Card, read_card
 
@@ -36,6 +36,7 @@ class Entry:
     layout: str
     """Kind of its motion, and how many channels."""
     size_bytes: int
+    """Of all files that it needs, those too that others of the package need."""
     card: Card
 
 
@@ -59,7 +60,7 @@ def entry_of(path: Path) -> Entry:
 
     folder, card = open_folder(path), read_card(path / CARD)
     method, layout = str(folder.manifest["method"]), folder.layout
-    size = sum(file.stat().st_size for file in path.iterdir())
+    size = sum(place_of(path, name).stat().st_size for name in (*folder.contents, MANIFEST, CARD))
     part = capabilities_of(method).part
     return Entry(path.name, path, method, part, f"{layout.channels} {layout.kind}", size, card)
 

@@ -2,14 +2,16 @@ import json
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
 import facesynth
+from facesynth.evaluation.lips import lip_opening
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.folder import CARD
+from facesynth.inference.folder import CARD, MANIFEST, open_folder, place_of
 from facesynth.speech.audio import save_wav
 from facesynth.zoo.card import Card, card_of, draft, read_card, write_card
 from facesynth.zoo.parcel import SUFFIX, pull, push
@@ -47,7 +49,7 @@ def hum(path, seconds=1.0, rate=16000):
     return path
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in PACKAGED.iterdir()))
+@pytest.mark.parametrize("name", sorted(path.parent.name for path in PACKAGED.glob(f"*/{CARD}")))
 def test_a_model_of_the_package_has_a_card_that_says_what_it_may_be_used_for(name):
     found = entry(name)
     assert found.card.licence != "unknown"
@@ -68,8 +70,22 @@ def test_the_default_model_streams_by_its_name_and_one_that_cannot_says_so():
         facesynth.load("grid-s1").stream()
 
 
-def test_all_models_of_the_package_are_small_enough_to_come_with_it():
-    assert sum(entry(path.name).size_bytes for path in PACKAGED.iterdir()) < 15e6
+def test_all_models_of_the_package_are_small_enough_to_come_with_it_and_nothing_comes_twice():
+    contents = [path.read_bytes() for path in PACKAGED.rglob("*") if path.is_file()]
+    assert sum(map(len, contents)) < 15e6
+    assert len(set(contents)) == len(contents)
+
+
+def test_what_several_models_have_alike_goes_with_each_that_is_copied_or_sent(tmp_path, own_cache):
+    from facesynth.zoo.copying import copy_packaged
+
+    shared = {path.name for path in PACKAGED.iterdir() if path.is_file()}
+    copy_packaged(Path(DEFAULT), tmp_path / "copied", changed=False)
+    parcel, _ = push(PACKAGED / DEFAULT, tmp_path)
+    assert shared
+    assert shared < {path.name for path in (tmp_path / "copied").iterdir()}
+    assert shared < set(zipfile.ZipFile(parcel).namelist())
+    assert entry(DEFAULT).size_bytes == sum(path.stat().st_size for path in (tmp_path / "copied").iterdir())
 
 
 def test_a_name_speaks_without_torch_and_so_does_no_name(tmp_path):
@@ -87,6 +103,16 @@ def test_the_same_model_is_loaded_by_its_name_and_by_its_folder(speech_of_lips):
     by_name, by_path = facesynth.load(DEFAULT), facesynth.load(PACKAGED / DEFAULT)
     assert np.array_equal(by_name.synthesize(speech_of_lips).frames, by_path.synthesize(speech_of_lips).frames)
     assert by_name.provenance
+
+
+@pytest.mark.parametrize("name", [name for name in names() if entry(name).part == "mouth" and names()[name].parent == PACKAGED])
+def test_every_mouth_of_the_package_opens_and_shuts_in_a_syllable(name, speech_of_lips):
+    model = facesynth.load(name)
+    motion = model.synthesize(speech_of_lips)
+    opening, bounds = lip_opening(motion), speech_of_lips.phones.frame_bounds(motion.fps)
+    assert len(motion) == round(speech_of_lips.duration_s * motion.fps)
+    assert np.isfinite(motion.frames).all()
+    assert opening[bounds[1] : bounds[2]].min() < opening[bounds[2] : bounds[3]].max() - 1
 
 
 @pytest.fixture
@@ -123,8 +149,8 @@ def test_a_model_travels_in_one_file_and_is_the_same_there(tmp_path, own_cache, 
 
 def copy(folder, target):
     target.mkdir()
-    for path in folder.iterdir():
-        (target / path.name).write_bytes(path.read_bytes())
+    for name in (*open_folder(folder).contents, MANIFEST, CARD):
+        (target / name).write_bytes(place_of(folder, name).read_bytes())
 
 
 def test_what_was_changed_on_the_way_is_not_used(tmp_path, own_cache):
