@@ -27,7 +27,7 @@ from facesynth.inference.lips import bilabial_spans, heights_between
 from facesynth.methods.registry import create
 from facesynth.motion.planar import picture_points
 from facesynth.progress import track
-from facesynth.stage.speaker_pictures import speaker_of
+from facesynth.stage.speaker_pictures import closed_at_phones, speaker_of
 
 BEFORE = {"jump_weight": 0.1, "fade_s": 0.0}
 """How pictures were chosen, and jumped, before the lips were known."""
@@ -84,11 +84,15 @@ def drawn(
 ) -> dict[str, dict[str, tuple[Pictures, Report]]]:
     """The pictures of each utterance of `test` on the face of `train`, by the recorded points and by a model's."""
     others = corpus.subset(train)
-    model, face = create(method).fit(others), TexturedFace(speaker_of(others), **settings)
+    model, speaker = create(method).fit(others), speaker_of(others)
+    face = TexturedFace(speaker, **settings)
     made: dict[str, dict[str, tuple[Pictures, Report]]] = {way: {} for way in WAYS if when in way}
     for name in test:
         for way, clips in made.items():
-            motion = corpus[name].motion if "recorded" in way else model.synthesize(corpus[name].speech)
+            motion = corpus[name].motion
+            if "recorded" not in way:
+                speech = corpus[name].speech
+                motion = closed_at_phones(model.synthesize(speech), speech.phones, speaker)
             report, behind = Report(), ping_pong(0, len(face.speaker.backgrounds), len(motion))
             clips[name] = np.stack(list(face.draw(picture_points(motion.frames), behind, report))), report
     return made

@@ -22,7 +22,7 @@ from facesynth.progress import track
 from facesynth.stage.cast import Cast
 from facesynth.stage.performance import Written
 from facesynth.stage.request import Part, Request
-from facesynth.stage.speaker_pictures import load_face
+from facesynth.stage.speaker_pictures import closed_at_phones, load_face
 from facesynth.stage.whole_face import described
 
 OUTPUTS = (".mp4", ".npz")
@@ -82,7 +82,8 @@ class PictureStage:
         return cls(load_face(mouth), request, (warning,) if idle else ())
 
     def perform(self, motion: Motion, speech: Speech, cast: Cast) -> Likeness:
-        """Put a motion on the face."""
+        """Put a motion on the face; its lips are shut at each p, b and m."""
+        motion = closed_at_phones(motion, speech.phones, self.speaker)
         sources = {"mouth": described(cast.mouth), "head": OF_PICTURES, "eyes": OF_PICTURES}
         return Likeness(speech, motion, self.speaker, self.request.pictures, sources)
 

@@ -1,5 +1,6 @@
 """The pictures of a speaker whose real face is shown: taken from a corpus of followed points, kept beside the model."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,15 @@ from facesynth.capture.points.footage import read_footage
 from facesynth.capture.points.shapes import Shapes
 from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos, shapes_beside
+from facesynth.face.texture.lips import facing
 from facesynth.face.texture.speaker import Speaker, lower_face_window
+from facesynth.inference.closures import close_at, closing_direction
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.lips import bilabial_spans, has_lips
+from facesynth.inference.motion import Motion
+from facesynth.inference.speech import PhoneTrack
 from facesynth.methods.trained import TrainedModel
-from facesynth.motion.planar import HeadMaps, has_mouth, inner_outline, is_tracked
+from facesynth.motion.planar import HeadMaps, has_mouth, inner_outline, is_tracked, motion_frames, picture_points
 from facesynth.progress import track
 
 LARGEST_PICTURES_BYTES = 300_000_000
@@ -73,7 +79,38 @@ def speaker_of(corpus: Corpus) -> Speaker:
         fps=shapes[calm].fps,
         inner_lips=inner_outline(corpus.layout),
         jaw=corpus.layout.group("jaw") if has_mouth(corpus.layout) else np.zeros(0, np.int64),
+        shut=shut_lips(corpus),
     )
+
+
+def shut_lips(corpus: Corpus) -> NDArray[np.float64]:
+    """[U] px between facing points of the inner lips where p, b and m are narrowest, the median; none where none is said."""
+    if not has_mouth(corpus.layout):
+        return np.zeros(0)
+    upper, lower = facing(inner_outline(corpus.layout))
+    found = []
+    for utterance in corpus:
+        points = picture_points(utterance.motion.frames)
+        across = np.linalg.norm(points[:, lower] - points[:, upper], axis=-1)
+        for start, stop in bilabial_spans(utterance.speech.phones, utterance.motion.fps):
+            if len(said := across[start:stop]):
+                found.append(said[said.mean(axis=1).argmin()])
+    return np.median(found, axis=0) if found else np.zeros(0)
+
+
+def closed_at_phones(motion: Motion, phones: PhoneTrack, speaker: Speaker) -> Motion:
+    """A motion of the speaker's points whose lips are shut at each p, b and m, the jaw and the cheeks along with them.
+
+    So it is for every method: some shut the lips themselves, others leave them open by what they do not hear.
+    """
+    if not len(speaker.shut) or not has_lips(motion.layout):
+        return motion
+    upper = facing(speaker.inner_lips)[0].tolist()
+    nearest = float(np.mean([speaker.shut[upper.index(above)] for above, _ in motion.layout.lip_pairs]))
+    recorded = motion_frames(speaker.shapes).astype(np.float64)
+    spans, along = bilabial_spans(phones, motion.fps), closing_direction(recorded, motion.layout)
+    closed = close_at(motion.frames.astype(np.float64), motion.layout, spans, nearest, motion.fps, along)
+    return replace(motion, frames=closed.astype(np.float32))
 
 
 def load_face(mouth: TrainedModel) -> Speaker:

@@ -8,7 +8,7 @@ import torch
 
 from facesynth.face.texture.compose import Report, TexturedFace
 from facesynth.face.texture.interior import Interior, Sources, jaw_maps
-from facesynth.face.texture.lips import Lips
+from facesynth.face.texture.lips import Lips, facing, meeting
 from facesynth.face.texture.speaker import Speaker, lower_face_window
 from facesynth.motion.planar import HeadMaps
 
@@ -100,6 +100,57 @@ def test_nothing_appears_from_one_moment_to_the_next(speaker):
 
 def test_shut_lips_show_no_interior(speaker):
     assert np.array_equal(drawn_mouth(speaker, [-2.0])[0], np.full((HEIGHT, WIDTH), SKIN, np.float32))
+
+
+RED = 1.5
+"""px that the points of a lip lie on its red, from where it ends."""
+
+
+def on_the_red(shapes):
+    """[T, 22, 2] the shapes as a face mesh sees them: 3 px apart where lips touch."""
+    seen = shapes.copy()
+    seen[:, 1:8, 1] -= RED
+    seen[:, 9:16, 1] += RED
+    return seen
+
+
+def as_a_mesh_sees(speaker):
+    return replace(speaker, shapes=on_the_red(speaker.shapes), shut=np.full(7, 2 * RED))
+
+
+def test_points_on_the_red_meet_where_lips_do():
+    truth = np.stack([shape(opening) for opening in (2.0, 9.0, 16.0)])
+    shut, usual = np.full(7, 2 * RED), np.full(7, 8.0)
+    np.testing.assert_allclose(meeting(on_the_red(truth), OUTLINE, shut, usual), truth, atol=1e-9)
+    upper, lower = facing(OUTLINE)
+    met = meeting(on_the_red(shape(-2.0)[None]), OUTLINE, shut, usual)
+    np.testing.assert_allclose(met[:, lower, 1] - met[:, upper, 1], 0.32)  # a little is left
+
+
+def test_shut_lips_hide_what_an_open_picture_shows(speaker):
+    """No picture of the speaker is anywhere near it: where it is known how lips meet, a wide open one is warped shut."""
+    target, background = on_the_red(shape(-2.0)[None]), np.array([0])
+    wide = np.flatnonzero(speaker.shapes[:, 12, 1] - speaker.shapes[:, 4, 1] > 9)
+    names = ("pictures", "shapes", "linear", "shift", "clip_starts")
+    known = as_a_mesh_sees(replace(speaker, **{name: getattr(speaker, name)[wide] for name in names}))
+    holes = []
+    for some in (known, replace(known, shut=np.zeros(0))):
+        drawn = next(TexturedFace(some).draw(target, background, Report())).astype(float)[..., 0]
+        holes.append((np.abs(drawn[40:62, 44:87] - SKIN) > 12).sum(axis=0)[2:-2].mean())
+    assert holes[0] < 0.8  # px high, on average: the line between the lips
+    assert holes[1] > 1.2
+
+
+def test_shut_lips_are_taken_from_pictures_of_shut_lips(speaker):
+    """Though a picture of open lips has cheeks and jaw where they are wanted."""
+    shapes = on_the_red(np.stack([shape(-2.0), shape(0.0), shape(6.0)]))
+    shapes[0, 16:] += 16.0
+    starts = np.array([True, False, False])
+    few = replace(speaker, pictures=speaker.pictures[:3], shapes=shapes, clip_starts=starts, linear=speaker.linear[:3])
+    known = replace(few, shift=speaker.shift[:3], shut=np.full(7, 2 * RED))
+    wanted = on_the_red(shape(-2.0)[None])
+    assert TexturedFace(known).choose(wanted, "nearest")[0] == 0
+    assert TexturedFace(replace(known, shut=np.zeros(0))).choose(wanted, "nearest")[0] == 1
 
 
 def test_the_face_draws_it_and_a_speaker_without_lips_does_not(speaker):

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.motion.search.cheapest import cheapest
 from facesynth.motion.search.pictures import PictureSteps
 
-JUMP_WEIGHT = 2.0
+JUMP_WEIGHT = 6.0
 """How much a jump between training pictures costs, of a typical distance of shapes; see `coherent`."""
 FADE_S = 0.12
 """How long one picture fades into the other where they jump."""
@@ -119,7 +119,8 @@ class TexturedFace:
         jump_weight: float = JUMP_WEIGHT,
         fade_s: float = FADE_S,
     ) -> None:
-        self.speaker = speaker
+        self._meeting = speaker.meeting
+        self.speaker = speaker = replace(speaker, shapes=speaker.meeting(speaker.shapes))
         self.jump_weight, self.fade = jump_weight, round(fade_s * speaker.fps)
         self.device = torch.device(device)
         self.mesh: Mesh = mesh_without_folds(speaker.shapes, speaker.inner_lips)
@@ -139,7 +140,8 @@ class TexturedFace:
         """Pictures [H, W, 3] for shapes [T, K, 2] (head-fixed px) over the whole pictures number `background` [T]."""
         if len(shapes) != len(background):
             raise FacesynthError(f"every shape needs a background; got {len(shapes)} shapes and {len(background)} backgrounds")
-        sources = self.choose(shapes, choice)
+        shapes = self._meeting(shapes)
+        sources = self._chosen(shapes, choice)
         following = self._following(sources)
         report.jumps, report.fps = int((~following).sum()), self.speaker.fps
         drawn_from = self._fades(sources, following)
@@ -172,7 +174,11 @@ class TexturedFace:
         return Sources(sources, before, share)
 
     def choose(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
-        """[T] number of the training picture for each shape."""
+        """[T] number of the training picture for each shape [T, K, 2]."""
+        return self._chosen(self._meeting(shapes), choice)
+
+    def _chosen(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
+        """The same for shapes whose lips meet where they are shut."""
         wanted, known = self.speaker.compared(shapes), self.speaker.compared(self.speaker.shapes)
         if choice == "nearest":
             return nearest(wanted, known)

@@ -32,8 +32,10 @@ OF_OTHERS = 0.03
 PER_PX = 2
 """Samples of the interior for each pixel, so that pictures that are put together stay sharp."""
 MARGIN_PX = 3.0
-FEATHER = 0.06
-"""Of the mouth's width: over this distance from the lips' points, which lie on their red, the interior comes to be seen."""
+FEATHER = 0.03
+"""Of the mouth's width: over this distance from where the lips end the interior comes to be seen."""
+UNSEEN = 0.3
+"""Of that distance: a slit that is narrower is left between lips that meet, see `lips.meeting`, and shows nothing."""
 LARGEST_GAIN = 1.3
 MIDDLE = (0.35, 0.65)
 """Of the way from the upper lip to the lower one, between which the skull's reading gives way to the jaw's."""
@@ -103,7 +105,7 @@ class Interior:
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(1, -1, 2) + np.array(corner)
         places = head.to_head(np.broadcast_to(pixels.astype(np.float64), (len(shapes), *pixels.shape[1:])))
         seen = [lips.between(t, places[t]) for t in range(len(shapes))]
-        opacity = _eased(np.stack([depth for depth, _ in seen]) / self._feather)
+        opacity = _eased(np.stack([depth for depth, _ in seen]) / self._feather - UNSEEN)
         of_jaw = _eased((np.stack([down for _, down in seen]) - MIDDLE[0]) / (MIDDLE[1] - MIDDLE[0]))
         skull = self._of_skull.at(places, weights, chosen)
         below = self._of_jaw.at(jaw.to_head(places), weights, chosen)

@@ -1,4 +1,4 @@
-"""The inner lips of shapes: how far they are apart, and what lies between them."""
+"""The inner lips of shapes: how far they are apart, where they meet, and what lies between them."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -7,6 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.inference.arrays import Floats
+
+LEFT_OPEN = 0.04
+"""Of the mean distance of two facing points, what is left between lips that meet: triangles between them keep an area."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,30 @@ class Lips:
         top, bottom = (_height(row[t], x) for row in (self.upper, self.lower))
         depth = np.minimum(y - top, bottom - y)
         return depth, (y - top) / np.maximum(bottom - top, 1e-6)
+
+
+def facing(outline: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Numbers of the points of the upper and of the lower lip that face each other [U], without the corners."""
+    corners = len(outline) // 2 + 1
+    return outline[1 : corners - 1], outline[corners:][::-1]
+
+
+def meeting(shapes: Floats, outline: NDArray[np.int64], shut: Floats, usual: Floats) -> Floats:
+    """Shapes [T, K, 2] with the points of the inner lips where the lips end, so that they meet where lips are shut.
+
+    A face mesh lays them on the red of the lips: facing points are `shut` [U] px apart though the lips touch, `usual` [U] px
+    on average. Both go half of the way that they are too far apart towards each other, so that a warp from open lips to
+    shut ones leaves nothing of what was seen between them.
+    """
+    upper, lower = facing(outline)
+    across = shapes[:, lower] - shapes[:, upper]
+    distance = np.linalg.norm(across, axis=-1, keepdims=True)
+    left = np.maximum(distance - shut[:, None], np.minimum(distance, LEFT_OPEN * usual[:, None]))
+    kept = left / np.maximum(distance, 1e-9)
+    out = shapes.copy()
+    out[:, upper] += across * (1 - kept) / 2
+    out[:, lower] -= across * (1 - kept) / 2
+    return out
 
 
 def _height(row: Floats, x: Floats) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facesynth.atomic import atomic_path
-from facesynth.face.texture.lips import Lips
+from facesynth.face.texture.lips import Lips, facing, meeting
 from facesynth.face.texture.mesh import ringed_mesh
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.npz import read_arrays
@@ -16,10 +16,14 @@ from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16
 """Side of the little grey picture of the lower face by which pictures are compared."""
-OF_THE_MOUTH = ("inner_lips", "jaw")
+OF_THE_MOUTH = ("inner_lips", "jaw", "shut")
 """Arrays that files from before there were lips lack."""
 OPENING_WEIGHT = 10.0
 """How much more than a point's place a distance of the lips counts where shapes are compared."""
+SHUT_WEIGHT = 18.0
+"""px; how much shut and open mouths differ where shapes are compared: more than jumps to a picture of shut lips and back."""
+SHUT_UP_TO = 0.06
+"""Of the mouth's width: a mean distance of the inner lips from which on they count as open."""
 MARGIN_PX = 4
 """Around the ring of the mesh, so that bilinear sampling always has neighbours."""
 
@@ -52,11 +56,21 @@ class Speaker:
     """Numbers of the points on the inner lips, the upper one with both corners, then the lower one back; none if unknown."""
     jaw: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Numbers of the points that move with the jaw."""
+    shut: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    """px how far apart points of the inner lips that face each other are where lips are shut; none if unknown, see `meeting`."""
 
     @property
     def knows_lips(self) -> bool:
         """Whether it is known where the mouth opens, and how the jaw moves."""
         return len(self.inner_lips) > 0 and len(self.jaw) > 1
+
+    def meeting(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Shapes [T, K, 2] with the inner lips where they end, as far as it is known; see `lips.meeting`."""
+        if not len(self.shut):
+            return shapes
+        upper, lower = facing(self.inner_lips)
+        usual = np.linalg.norm(self.shapes[:, lower] - self.shapes[:, upper], axis=-1).mean(axis=0)
+        return meeting(shapes, self.inner_lips, self.shut, usual)
 
     def compared(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
         """[T, K', 2] by which shapes [T, K, 2] are compared: their points and, where the lips are known, how far these are open.
@@ -65,7 +79,18 @@ class Speaker:
         """
         if not self.knows_lips:
             return shapes
-        return np.concatenate([shapes, OPENING_WEIGHT * self.lips_apart(shapes)], axis=1)
+        known = np.concatenate([shapes, OPENING_WEIGHT * self.lips_apart(shapes)], axis=1)
+        return np.concatenate([known, np.sqrt(known.shape[1]) * self.shutness(shapes)], axis=1) if len(self.shut) else known
+
+    def shutness(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """[T, 1, 2] SHUT_WEIGHT px where lips of shapes [T, K, 2], see `meeting`, are shut, 0 where they are clearly open.
+
+        A shut mouth looks like no open one that is warped to it: lips are pressed together, and no hole is to be hidden.
+        """
+        upper, lower = facing(self.inner_lips)
+        opening = np.linalg.norm(shapes[:, lower] - shapes[:, upper], axis=-1).mean(axis=1)
+        share = np.clip(1 - opening / (SHUT_UP_TO * Lips.of(self.shapes, self.inner_lips).width), 0, 1)
+        return np.stack([SHUT_WEIGHT * share, np.zeros(len(shapes))], axis=-1)[:, None]
 
     def lips_apart(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
         """[T, U, 2] px how far the lips of shapes [T, K, 2] are apart, on a scale on which the first pixels count most.
@@ -152,7 +177,9 @@ def _fault(speaker: Speaker) -> str:
         array = getattr(speaker, name)
         if array.shape != shape or not array.size or not np.isfinite(array).all():
             return f"{name} has shape {array.shape}, or is not finite"
-    for name in OF_THE_MOUTH:
+    if len(speaker.shut) and (speaker.shut.shape != facing(speaker.inner_lips)[0].shape or not np.isfinite(speaker.shut).all()):
+        return f"shut has shape {speaker.shut.shape}, or is not finite"
+    for name in ("inner_lips", "jaw"):
         numbers = getattr(speaker, name)
         if (
             numbers.ndim != 1
