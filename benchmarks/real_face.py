@@ -2,10 +2,12 @@
 
     facesynth corpus add actor/ clips/*.mp4 --points --text-file lines.csv
     facesynth corpus add plain/ clips/*.mp4 --points --box 100,60,225,242 --text-file lines.csv
-    python benchmarks/real_face.py actor/ --before plain/ -o report/ [--folds 5] [--method lds]
+    python benchmarks/real_face.py actor/ lds network efase:configs/efase_soft.yaml --before plain/ -o report/ [--folds 5]
 
-A face whose place is said (`--box`) has followed points alone, and is drawn as before the lips were known. The face mesh
-finds the lips in drawn and recorded video alike; millimetres take the outer corners of the eyes to be 90 mm apart.
+A row for each method, and one of the recorded motion, so that the drawing alone is judged; of the first method and of the
+recorded motion also as they were drawn before: a face whose place is said (`--box`) has followed points alone, and is drawn
+as before the lips were known. The face mesh finds the lips in drawn and recorded video alike; millimetres take the outer
+corners of the eyes to be 90 mm apart.
 """
 
 import argparse
@@ -14,17 +16,21 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from facesynth.atomic import write_text
 from facesynth.capture.landmarks import LIP_PAIRS, LOWER_INNER, OUTER_CORNERS, OUTER_CORNERS_MM, UPPER_INNER
 from facesynth.capture.points.footage import read_footage
-from facesynth.capture.tracker import Tracker
+from facesynth.capture.square import Square
+from facesynth.capture.tracker import Tracker, around
 from facesynth.corpus import Corpus, Utterance
 from facesynth.corpus.importers.points import kept_videos
+from facesynth.evaluation.contestants import Contestant, contestant
 from facesynth.evaluation.drawn_mouth import steps, sudden, teeth
 from facesynth.face.texture.compose import Report, TexturedFace, ping_pong
+from facesynth.face.texture.speaker import Speaker
 from facesynth.inference.lips import bilabial_spans, heights_between
-from facesynth.methods.registry import create
+from facesynth.inference.motion import Motion
 from facesynth.motion.planar import picture_points
 from facesynth.progress import track
 from facesynth.stage.speaker_pictures import closed_at_phones, speaker_of
@@ -33,8 +39,11 @@ BEFORE = {"jump_weight": 0.1, "fade_s": 0.0}
 """How pictures were chosen, and jumped, before the lips were known."""
 MOUTH_PX = 24
 """Half the side of the head-fixed picture of the mouth, as the lips' width is 32 of its pixels."""
-WAYS = ("before", "now", "recorded motion, before", "recorded motion, now")
-"""The second two say the clip by its own recorded points, so that the drawing alone is judged."""
+RECORDED = "recorded motion"
+"""The row that says a clip by its own recorded points."""
+STEADIED_FRAMES = 3.0
+SHIFTS = ((0.0, 0.0), (0.02, 0.02), (-0.02, 0.02), (0.02, -0.02), (-0.02, -0.02))
+"""Right and down, of the side of the square that is read."""
 Pictures = NDArray[np.uint8]
 
 
@@ -43,9 +52,11 @@ class Row:
     """Of one clip, recorded or drawn."""
 
     gaps_mm: tuple[float, ...]
-    """Smallest gap at each p, b and m."""
+    """Smallest gap at each p, b and m, pictures read in steady squares."""
     recorded_mm: tuple[float, ...]
     """The recorded ones of the same clip."""
+    followed_mm: tuple[float, ...]
+    """Smallest gap at each p, b and m where the square follows the face, as in capture."""
     folded: float
     """Triangles turned over, in all pictures."""
     jumps: float
@@ -62,40 +73,45 @@ class Row:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("corpus", type=Path)
-    parser.add_argument("--before", type=Path, required=True, help="the same clips, added with --box")
+    parser.add_argument("methods", nargs="+", help="names, or NAME:settings.yaml")
+    parser.add_argument("--before", type=Path, help="the same clips, added with --box")
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--folds", type=int, default=5)
-    parser.add_argument("--method", default="lds")
     options = parser.parse_args()
-    rows: dict[str, list[Row]] = {name: [] for name in ("recorded", *WAYS)}
-    corpus, plain = Corpus.open(options.corpus), Corpus.open(options.before)
+    rows: dict[str, list[Row]] = {}
+    corpus, plain = Corpus.open(options.corpus), options.before and Corpus.open(options.before)
+    methods = [contestant(spec) for spec in options.methods]
     for train, test in track(list(corpus.folds(options.folds)), "folds"):
-        made = {**drawn(plain, train.ids, test.ids, options.method, "before", **BEFORE)}
-        made |= drawn(corpus, train.ids, test.ids, options.method, "now")
+        made = drawn(plain, train.ids, test.ids, methods[:1], ", before", **BEFORE) if plain else {}
+        made |= drawn(corpus, train.ids, test.ids, methods)
         for utterance in test:
             judge(utterance, read_footage(kept_videos(corpus)[utterance.id]).frames, made, rows, options.output)
-    text = table(rows)
-    write_text(options.output / "table.md", text)
-    print(text)
+        write_text(options.output / "table.md", table(rows))
+    print(table(rows))
 
 
 def drawn(
-    corpus: Corpus, train: tuple[str, ...], test: tuple[str, ...], method: str, when: str, **settings: float
+    corpus: Corpus, train: tuple[str, ...], test: tuple[str, ...], methods: list[Contestant], when: str = "", **settings: float
 ) -> dict[str, dict[str, tuple[Pictures, Report]]]:
-    """The pictures of each utterance of `test` on the face of `train`, by the recorded points and by a model's."""
+    """By row: the pictures of each utterance of `test` on the face of `train`, by models of it and by the recorded points."""
     others = corpus.subset(train)
-    model, speaker = create(method).fit(others), speaker_of(others)
+    speaker = speaker_of(others)
     face = TexturedFace(speaker, **settings)
-    made: dict[str, dict[str, tuple[Pictures, Report]]] = {way: {} for way in WAYS if when in way}
-    for name in test:
-        for way, clips in made.items():
-            motion = corpus[name].motion
-            if "recorded" not in way:
-                speech = corpus[name].speech
-                motion = closed_at_phones(model.synthesize(speech), speech.phones, speaker)
-            report, behind = Report(), ping_pong(0, len(face.speaker.backgrounds), len(motion))
-            clips[name] = np.stack(list(face.draw(picture_points(motion.frames), behind, report))), report
-    return made
+    motions = {one.label + when: said(one, others, corpus.subset(test), speaker) for one in methods}
+    motions[RECORDED + when] = {utterance.id: utterance.motion for utterance in corpus.subset(test)}
+    return {row: {name: pictures(face, motion) for name, motion in some.items()} for row, some in motions.items()}
+
+
+def said(method: Contestant, train: Corpus, test: Corpus, speaker: Speaker) -> dict[str, Motion]:
+    """What a method makes of each utterance, its lips shut as where a real face speaks."""
+    model = method.create().fit(train)
+    return {u.id: closed_at_phones(model.synthesize(u.speech), u.speech.phones, speaker) for u in test}
+
+
+def pictures(face: TexturedFace, motion: Motion) -> tuple[Pictures, Report]:
+    """A motion drawn over the speaker's calm clip."""
+    report, behind = Report(), ping_pong(0, len(face.speaker.backgrounds), len(motion))
+    return np.stack(list(face.draw(picture_points(motion.frames), behind, report))), report
 
 
 def judge(
@@ -109,7 +125,8 @@ def judge(
     clips = {"recorded": real} | {name: drawn[utterance.id][0] for name, drawn in made.items()}
     seen = {name: landmarks(frames) for name, frames in clips.items()}
     spans = [span for span in bilabial_spans(utterance.speech.phones, 25.0) if span[1] > span[0]]
-    gaps = {name: smallest_gaps(points, spans) for name, points in seen.items()}
+    followed = {name: smallest_gaps(points, spans) for name, points in seen.items()}
+    gaps = {name: smallest_gaps(read_again(clips[name], points, spans), spans) for name, points in seen.items()}
     mouths = {name: mouth_pictures(clips[name], points) for name, points in seen.items()}
     moved = {name: steps(grey) for name, (grey, _) in mouths.items()}
     for name in clips:
@@ -118,7 +135,18 @@ def judge(
         own, recorded = (tuple(gaps[which].tolist()) for which in (name, "recorded"))
         jumpy = sudden(moved[name], moved["recorded"])
         drawing = (float(report.folded_triangles), float(report.jumps))
-        rows[name].append(Row(own, recorded, *drawing, jumpy, found.left_over, found.blinking, report.real_time_factor))
+        rows.setdefault(name, []).append(
+            Row(
+                own,
+                recorded,
+                tuple(followed[name].tolist()),
+                *drawing,
+                jumpy,
+                found.left_over,
+                found.blinking,
+                report.real_time_factor,
+            )
+        )
     save_sheet(clips, seen, output / f"{utterance.id}.png")
 
 
@@ -129,6 +157,23 @@ def landmarks(frames: Pictures) -> NDArray[np.float64]:
         seen = tracker.follow(frame)
         found.append(seen.points[:, :2].astype(np.float64) if seen is not None else found[-1])
     return np.stack(found)
+
+
+def read_again(frames: Pictures, points: NDArray[np.float64], spans: list[tuple[int, int]]) -> NDArray[np.float64]:
+    """Landmarks [T, 468, 2] like `points`, those of spans of frames anew: the mean of readings in squares that are steady.
+
+    What the mesh finds in a picture changes by half a millimetre with the square that is cut out for it, and a square that
+    follows the face has the size that the mouth had in the picture before.
+    """
+    tracker, found = Tracker(), points.copy()
+    whole = around(np.median(points, axis=0))
+    middles = gaussian_filter1d((points.min(axis=1) + points.max(axis=1)) / 2, STEADIED_FRAMES, axis=0, mode="nearest")
+    for t in sorted({t for start, stop in spans for t in range(start, min(stop, len(frames)))}):
+        (x, y), side = middles[t].tolist(), whole.side_px
+        squares = [Square(x + right * side, y + down * side, side, whole.tilt_rad) for right, down in SHIFTS]
+        seen = [looked.points[:, :2] for square in squares if (looked := tracker.look(frames[t], square)) is not None]
+        found[t] = np.mean(seen, axis=0) if seen else points[t]
+    return found
 
 
 def smallest_gaps(points: NDArray[np.float64], spans: list[tuple[int, int]]) -> NDArray[np.float64]:
@@ -182,16 +227,18 @@ def save_sheet(clips: dict[str, Pictures], seen: dict[str, NDArray[np.float64]],
 
 def table(rows: dict[str, list[Row]]) -> str:
     """Markdown: gaps over all p, b and m of all clips, the others as means over clips."""
-    names = [field.name for field in fields(Row)][2:]
-    head = ["median smallest gap, mm", "median distance from the recorded one", *names]
+    names = [field.name for field in fields(Row)][3:]
+    head = ["median smallest gap, mm", "median distance from the recorded one", "median where the square follows", *names]
     lines = ["| | " + " | ".join(head) + " |", "|---|" + "---:|" * len(head)]
     for name, some in rows.items():
-        gaps, recorded = (np.concatenate([getattr(row, field) for row in some]) for field in ("gaps_mm", "recorded_mm"))
-        values = [np.median(gaps), np.median(np.abs(gaps - recorded))]
+        gaps, recorded, followed = (
+            np.concatenate([getattr(row, field) for row in some]) for field in ("gaps_mm", "recorded_mm", "followed_mm")
+        )
+        values = [np.median(gaps), np.median(np.abs(gaps - recorded)), np.median(followed)]
         values += [np.nanmean([getattr(row, field) for row in some]) for field in names]
         lines.append(f"| {name} | " + " | ".join(f"{value:.3g}" for value in values) + " |")
-    closures = sum(len(row.gaps_mm) for row in rows["now"])
-    return f"{len(rows['now'])} clips, none of them learned from, {closures} closures\n\n" + "\n".join(lines) + "\n"
+    closures = sum(len(row.gaps_mm) for row in rows["recorded"])
+    return f"{len(rows['recorded'])} clips, none of them learned from, {closures} closures\n\n" + "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

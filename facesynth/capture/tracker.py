@@ -50,13 +50,13 @@ class Tracker:
 
     def follow(self, image: Image) -> Seen | None:
         """The face in the next picture, or None where it is not to be seen."""
-        seen = None if self._lost or self._last is None else self._look(image, self._last)
+        seen = None if self._lost or self._last is None else self.look(image, self._last)
         if seen is None:
             found = self._find(image)
-            seen = None if found is None else self._look(image, found)
+            seen = None if found is None else self.look(image, found)
         self._lost = seen is None
         if seen is not None:
-            self._last = _around(seen.points)
+            self._last = around(seen.points)
         return seen
 
     def check_alone(self, image: Image) -> None:
@@ -82,7 +82,8 @@ class Tracker:
             raise FacesynthError(f"face {number} was asked for, but the picture has {len(faces)}")
         return faces[number - 1]
 
-    def _look(self, image: Image, square: Square) -> Seen | None:
+    def look(self, image: Image, square: Square) -> Seen | None:
+        """What the mesh finds in one square of a picture, or None where that is no face; what follows does not change by it."""
         points, score = self._mesh.run(None, {"input": square.cut(image, MESH_PIXELS)[None]})
         logit = float(score.ravel()[0])
         if logit < PRESENT_LOGIT:
@@ -111,7 +112,7 @@ def _require_one(count: int) -> None:
         raise FacesynthError(f"there are {count} faces in the picture; say which with --face 1 (the leftmost) and so on")
 
 
-def _around(points: NDArray[np.float32]) -> Square:
+def around(points: NDArray[np.float32]) -> Square:
     """The square in which to look for points [468, 3] in the next picture."""
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     across = points[EYES[1][0], :2] - points[EYES[0][0], :2]

@@ -31,7 +31,7 @@ SETTINGS = {
     "noise_by_state": False,
     "close_lips": False,
 }
-OWN = "input learned from the sound around a frame, deterministic part"
+OWN = "today's default, deterministic part"
 PAPERS = "the paper's features, deterministic part"
 
 
@@ -44,7 +44,7 @@ def learned(material: Material) -> LDS:
 @lru_cache(maxsize=1)
 def made(material: Material) -> dict[str, Spoken]:
     """By row of the experiment: the tested utterances with what was made for them."""
-    paper, own = learned(material), LDS(hears="periodogram").fit(material.train, seed=material.seed)
+    paper, own = learned(material), LDS().fit(material.train, seed=material.seed)
     still = create("mean_face").fit(material.train, seed=material.seed)
     rows = {
         "mean pose": (still, {}),
