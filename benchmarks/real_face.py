@@ -13,6 +13,7 @@ corners of the eyes to be 90 mm apart.
 import argparse
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ def main() -> None:
 
 
 def drawn(
-    corpus: Corpus, train: tuple[str, ...], test: tuple[str, ...], methods: list[Contestant], when: str = "", **settings: float
+    corpus: Corpus, train: tuple[str, ...], test: tuple[str, ...], methods: list[Contestant], when: str = "", **settings: Any
 ) -> dict[str, dict[str, tuple[Pictures, Report]]]:
     """By row: the pictures of each utterance of `test` on the face of `train`, by models of it and by the recorded points."""
     others = corpus.subset(train)
@@ -152,7 +153,7 @@ def judge(
 
 def landmarks(frames: Pictures) -> NDArray[np.float64]:
     """[T, 468, 2] px; a picture in which no face is found has the points of the one before."""
-    tracker, found = Tracker(), []
+    tracker, found = Tracker(), list[NDArray[np.float64]]()
     for frame in frames:
         seen = tracker.follow(frame)
         found.append(seen.points[:, :2].astype(np.float64) if seen is not None else found[-1])
