@@ -1,11 +1,11 @@
 """What a face does over time: weights of its shapes, the head, the gaze and the tongue, at one rate."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.long_arrays import Growing, all_finite, row_blocks
@@ -81,9 +81,9 @@ class FaceAnimation:
         """[T] one shape's weights; zeros for a shape that this animation does not have."""
         return self.weights[:, self.names.index(name)] if name in self.names else np.zeros(len(self), np.float32)
 
-    def weights_for(self, names: tuple[str, ...]) -> NDArray[np.float32]:
-        """[T, len(names)] weights in another rig's order of shapes."""
-        return np.stack([self.weight(name) for name in names], axis=1)
+    def weights_for(self, names: tuple[str, ...], rows: slice = slice(None)) -> NDArray[np.float32]:
+        """[T, len(names)] weights in another rig's order of shapes, of some frames where they are named."""
+        return np.stack([self.weight(name)[rows] for name in names], axis=1)
 
     def resampled(self, fps: float) -> "FaceAnimation":
         """The same movement at another rate; 23.976 and 29.97 are fine.
@@ -99,7 +99,11 @@ class FaceAnimation:
             return self if fps == self.fps else self._stretched(fps)
         count = max(1, round(self.duration_s * fps))
         at = np.minimum(np.arange(count) / fps, self.times_s[-1])
-        rotation = Slerp(self.times_s, Rotation.from_rotvec(self.head[:, :3]))(at).as_rotvec()
+
+        def turned(times_s: NDArray[Any], turns: NDArray[Any], at_s: NDArray[Any]) -> NDArray[Any]:
+            return np.asarray(Slerp(times_s, Rotation.from_rotvec(turns))(at_s).as_rotvec())
+
+        rotation = _read(turned, self.times_s, self.head[:, :3], at, np.float64)
 
         def curve(values: NDArray[Any], low: ArrayLike = -np.inf, high: ArrayLike = np.inf) -> NDArray[np.float32]:
             return monotone_cubic(self.times_s, values, at, low, high)
@@ -131,13 +135,26 @@ def monotone_cubic(
     """[n, ...] values [T, ...] of ascending times [T] read at ascending times [n] within them, kept in low..high; T > 1."""
     from scipy.interpolate import PchipInterpolator
 
-    parts = Growing()
+    def read(times_s: NDArray[Any], some: NDArray[Any], at_s: NDArray[Any]) -> NDArray[Any]:
+        return np.clip(PchipInterpolator(times_s, some, axis=0)(at_s), low, high)
+
+    return _read(read, times_s, values, at_s, np.float32)
+
+
+def _read(
+    read: Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], NDArray[Any]],
+    times_s: NDArray[Any],
+    values: NDArray[Any],
+    at_s: NDArray[Any],
+    dtype: DTypeLike,
+) -> NDArray[Any]:
+    """What `read` makes of times, values and the times at which they are read, some values and those around them at a time."""
+    parts = Growing(dtype)
     for rows in row_blocks(values):
         around = slice(max(0, rows.start - SEEN), rows.stop + 1 + SEEN)
         first = np.searchsorted(at_s, times_s[rows.start])
         stop = np.searchsorted(at_s, times_s[rows.stop]) if rows.stop < len(times_s) else len(at_s)
-        read = PchipInterpolator(times_s[around], values[around], axis=0)(at_s[first:stop]) if first < stop else values[:0]
-        parts.add(np.clip(read, low, high))
+        parts.add(read(times_s[around], values[around], at_s[first:stop]) if first < stop else values[:0])
     return parts.whole()
 
 

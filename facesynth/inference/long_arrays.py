@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-LARGE_BYTES = 16 << 20
-"""What is smaller stays in memory: 90 s of sound at 44.1 kHz."""
+LARGE_BYTES = 4 << 20
+"""What is smaller stays in memory: 20 s of sound at 44.1 kHz."""
 BLOCK_BYTES, BLOCK_ROWS = 4 << 20, 1024
 """Looked at together, at most; of arrays with more than one axis so many rows, of which something larger may be made."""
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import lsq_linear
 
+from facesynth.face.solve import blendshapes
 from facesynth.face.solve.blendshapes import UNSEEN, MarkerBasis, follow_gap, solve_markers
 from facesynth.face.solve.bounded import solve
 from facesynth.inference.errors import FacesynthError
@@ -156,6 +157,16 @@ def test_known_shapes_are_taken_off_first(rig):
     without, _ = solve_markers(basis, frames, 120.0)
     assert np.abs(with_gaze - known).max() < 1e-4
     assert without[:, [rig.names.index(name) for name in UNSEEN]].max() == 0
+
+
+def test_what_is_solved_in_stretches_is_what_is_solved_as_a_whole(rig, monkeypatch):
+    layout, frames = markers_of(rig, speech_like(rig, 300))
+    basis = MarkerBasis.of(rig, layout)
+    weights, residual_mm = solve_markers(basis, frames, 120.0)
+    monkeypatch.setattr(blendshapes, "SOLVED", 110)
+    again, residual_again_mm = solve_markers(basis, frames, 120.0)
+    np.testing.assert_allclose(again, weights, atol=2e-3)
+    np.testing.assert_allclose(residual_again_mm, residual_mm, atol=2e-3)
 
 
 def test_long_takes_take_a_few_ms_a_frame(rig):

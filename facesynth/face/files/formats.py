@@ -47,11 +47,11 @@ def _is_arkit(animation: FaceAnimation) -> bool:
 
 def _csv(path: Path, animation: FaceAnimation, head: Head, motion: Motion | None) -> None:
     from facesynth.face.files.curves import write_curves
-    from facesynth.face.files.livelink import take_of, write_livelink
+    from facesynth.face.files.livelink import write_as_livelink
     from facesynth.motion.resample import resample
 
     if not isinstance(head, OwnHead) and _is_arkit(animation):
-        write_livelink(path, take_of(animation, motion))
+        write_as_livelink(path, animation, motion)
     elif isinstance(head, OwnHead) or motion is None or motion.layout.names != animation.names:
         write_curves(path, animation.names, animation.weights, animation.fps)
     else:  # in whatever range the method made them

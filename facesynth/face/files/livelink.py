@@ -1,5 +1,6 @@
 """Live Link Face takes: a CSV of timecode, 52 weights and nine angles of head and eyes."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from facesynth.atomic import atomic_path
 from facesynth.face.animation import FaceAnimation
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.long_arrays import row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.motion.arkit_names import ARKIT_NAMES
 from facesynth.motion.livelink import ANGLES, TIMECODE, WEIGHTS, read_take
@@ -41,19 +43,19 @@ class LiveLinkTake:
         return FaceAnimation(ARKIT_NAMES, weights, head, gaze, np.zeros(len(weights)), self.fps)
 
 
-def take_of(animation: FaceAnimation, motion: Motion | None = None) -> LiveLinkTake:
-    """An animation as a take that starts at midnight; translation and tongue tip have no column and are left out.
+def take_of(animation: FaceAnimation, motion: Motion | None = None, rows: slice = slice(None)) -> LiveLinkTake:
+    """An animation, or some of its frames, as a take that starts at midnight; translation and tongue tip have no column.
 
     motion: where it has the angles of each eye as curves of their own, those are what the eyes differ by.
     """
-    rate = nominal_rate(animation.fps)
-    gaze = -animation.gaze.astype(np.float64)
+    rate, times_s = nominal_rate(animation.fps), animation.times_s[rows]
+    gaze = -animation.gaze[rows].astype(np.float64)
     eyes = np.tile(np.concatenate([gaze, np.zeros((len(gaze), 1))], axis=1), (1, 2))
     if motion is not None and set(EYE_CURVES) <= set(motion.layout.names):
-        eyes += _apart(motion, animation.times_s)
-    head = _angles(animation.head[:, :3].astype(np.float64))
-    values = np.concatenate([animation.weights_for(ARKIT_NAMES), head, eyes], axis=1)
-    return LiveLinkTake(tuple(timecode(t, rate) for t in animation.times_s), values, animation.fps)
+        eyes += _apart(motion, times_s)
+    head = _angles(animation.head[rows, :3].astype(np.float64))
+    values = np.concatenate([animation.weights_for(ARKIT_NAMES, rows), head, eyes], axis=1)
+    return LiveLinkTake(tuple(timecode(t, rate) for t in times_s), values, animation.fps)
 
 
 def _apart(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,10 +68,22 @@ def _apart(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def write_livelink(path: str | Path, take: LiveLinkTake) -> None:
     """Write a take as the app does, ten decimals, Unix line ends."""
+    _write(path, [take])
+
+
+def write_as_livelink(path: str | Path, animation: FaceAnimation, motion: Motion | None = None) -> None:
+    """Write an animation as such a take, some frames at a time; see `take_of`."""
+    _write(path, (take_of(animation, motion, rows) for rows in row_blocks(animation.weights)))
+
+
+def _write(path: str | Path, takes: Iterable[LiveLinkTake]) -> None:
+    """Takes one after the other."""
     with atomic_path(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(HEADER) + "\n")
-        for time, values in zip(take.timecodes, take.values, strict=True):
-            file.write(f"{time},{COUNT}," + ",".join(f"{value + 0.0:.10f}" for value in values) + "\n")  # + 0.0: no minus zeros
+        for take in takes:
+            for time, values in zip(take.timecodes, take.values, strict=True):
+                # + 0.0: no minus zeros
+                file.write(f"{time},{COUNT}," + ",".join(f"{value + 0.0:.10f}" for value in values) + "\n")
 
 
 def read_livelink(path: str | Path, fps: float | None = None) -> LiveLinkTake:

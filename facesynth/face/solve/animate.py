@@ -16,7 +16,7 @@ from facesynth.face.solve.closures import MOUTH, with_lips_apart, with_lips_met
 from facesynth.face.solve.fitting import fit_layout, is_of_the_head, rest_of
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
-from facesynth.inference.long_arrays import all_finite
+from facesynth.inference.long_arrays import all_finite, by_blocks, joined, row_blocks
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.arkit_names import ARKIT_NAMES
@@ -141,11 +141,18 @@ def animate(
     weights, residual = _weights(motion, rig, phones)
     weights = amplified(weights, mouth_gain, LipGap.of(rig)) if mouth_gain != 1 else weights
     shut = _lids(motion, weights, made) if eyes_gain else np.zeros(len(motion))
-    _set_lids(weights, shut, awake=eyes_gain == 0)
-    weights = gaze_weights(weights, gaze)
-    weights[:, rig.index("tongueOut")[0]] = _tongue_out(weights, rig, phones, motion.fps)
-    tip = np.clip(tongue_track(TIP_UP, phones, len(motion), motion.fps), 0, 1)
-    return FaceAnimation(rig.names, np.clip(weights, 0, 1, out=weights), head, gaze, tip, motion.fps, residual)
+    out, tip = (tongue_track(targets, phones, len(motion), motion.fps) for targets in (TIP_OUT, TIP_UP))
+    lips, column = LipGap.of(rig), rig.index("tongueOut")[0]
+
+    def finished(rows: slice) -> NDArray[np.float64]:
+        some = np.array(weights[rows])
+        _set_lids(some, shut[rows], awake=eyes_gain == 0)
+        some = gaze_weights(some, gaze[rows])
+        some[:, column] = _tongue_out(some, column, lips, out[rows])
+        return np.clip(some, 0, 1)
+
+    whole = joined(finished(rows) for rows in row_blocks(weights))
+    return FaceAnimation(rig.names, whole, head, gaze, np.clip(tip, 0, 1), motion.fps, residual)
 
 
 def on_head(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> Motion:
@@ -169,7 +176,7 @@ def _check_whole(motion: Motion) -> None:
 def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     if motion.layout.kind == "curves":
         return _curves(motion), None
-    known = None if motion.eyes is None else gaze_weights(np.zeros((len(motion), len(rig.names))), motion.eyes[:, 1:])
+    known = None if motion.eyes is None else by_blocks(lambda eyes: _looking(eyes, len(rig.names)), motion.eyes, np.float64)
     if is_of_the_head(motion.layout):
         return solve_markers(MarkerBasis.of(rig, motion.layout), motion.frames, motion.fps, known)
     fit = fit_layout(rig, motion.layout, rest_of(motion))
@@ -177,6 +184,10 @@ def _weights(motion: Motion, rig: Rig, phones: PhoneTrack | None) -> tuple[NDArr
     lips = LipGap.of(rig)
     met = weights if phones is None else with_lips_met(weights, lips, phones, motion.fps)
     return with_lips_apart(close_within_jaw(met, lips), lips), residual
+
+
+def _looking(eyes: NDArray[np.float32], count: int) -> NDArray[np.float64]:
+    return gaze_weights(np.zeros((len(eyes), count)), eyes[:, 1:])
 
 
 def _curves(motion: Motion) -> NDArray[np.float64]:
@@ -233,8 +244,7 @@ def _set_lids(weights: NDArray[np.float64], shut: NDArray[np.float64], *, awake:
         weights[:, [squint, wide]] *= 1 - shut[:, None]
 
 
-def _tongue_out(weights: NDArray[np.float64], rig: Rig, phones: PhoneTrack | None, fps: float) -> NDArray[np.float64]:
-    """The tongue comes out between lips that are open; through shut lips it would show."""
-    own = weights[:, rig.index("tongueOut")[0]]
-    room = np.clip((LipGap.of(rig).opening_mm(weights) - 1.0) / 3.0, 0, 1)
-    return np.maximum(own, tongue_track(TIP_OUT, phones, len(weights), fps) * room)
+def _tongue_out(weights: NDArray[np.float64], column: int, lips: LipGap, out: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[T] how far the tongue comes out: as it does already, or as the phones ask [T] where lips are open; else it would show."""
+    room = np.clip((lips.opening_mm(weights) - 1.0) / 3.0, 0, 1)
+    return np.maximum(weights[:, column], out * room)

@@ -16,7 +16,7 @@ from facesynth.face.rig.markers import marker_vertices
 from facesynth.face.solve.bounded import solve
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
-from facesynth.inference.long_arrays import let_go
+from facesynth.inference.long_arrays import Growing, let_go
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 BLOCK = 2048
 """Frames whose markers are held in double precision at once."""
+SOLVED, BESIDE_S = 8192, 0.5
+"""Frames that are solved together, and what is solved at either side of them, seconds: a weight follows its neighbours in time
+within some 3 ms, so that what lies farther away changes none by as much as the solver's tolerance."""
 RIDGE = 2e-4
 """Share of the mean squared shape length that a shape pays for being used."""
 GAP_WEIGHT = 4.0
@@ -94,29 +97,35 @@ def solve_markers(
     """Weights [T, 52] of frames [T, C] of the basis's layout, head motion removed, and the residual [T] (mm, root mean square).
 
     known: [T, 52] weights of the shapes that are not solved for (gaze, tongue); zero where not given. Their
-    share of the motion is taken off the markers first.
+    share of the motion is taken off the markers first. What is longer than SOLVED frames is solved in stretches.
     """
-    weights = np.zeros((len(np.asarray(frames)), len(basis.shapes_mm)))  # takes no memory until it is written
-    if known is not None:
-        weights[:, ~basis.free] = np.asarray(known, np.float64)[:, ~basis.free]
-    pieces = [slice(first, first + BLOCK) for first in range(0, max(1, len(weights)), BLOCK)]
     lift = np.concatenate([np.eye(basis.shapes_mm.shape[1]), np.sqrt(GAP_WEIGHT) * basis.gap_rows]).T
     shapes = basis.shapes_mm[basis.free] @ lift
     onto = np.linalg.qr(shapes.T)[0]  # what lies outside of the shapes' span changes no weight
-    wanted = np.empty((len(weights), onto.shape[1]))
-    for piece in pieces:
-        wanted[piece] = (basis.offsets(frames, piece) - weights[piece] @ basis.shapes_mm) @ (lift @ onto)
-        let_go(np.asarray(frames))
-    weights[:, basis.free] = solve(shapes @ onto, wanted, basis.ridge[basis.free], fps=fps)
-    del wanted
-    residual_mm = np.empty(len(weights))
-    for piece in pieces:
-        offsets = basis.offsets(frames, piece)
-        weights[piece] = follow_gap(basis, weights[piece], offsets)
-        off = (weights[piece] @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
-        residual_mm[piece] = np.sqrt((off**2).sum(axis=2).mean(axis=1))
-        let_go(np.asarray(frames))
-    return weights, residual_mm
+    count, beside = len(np.asarray(frames)), round(BESIDE_S * fps)
+    weights, residual_mm = Growing(np.float64), Growing(np.float64)
+    for first in range(0, max(1, count), SOLVED):
+        stop, start = min(first + SOLVED, count), max(0, first - beside)
+        some = np.zeros((min(stop + beside, count) - start, len(basis.shapes_mm)))
+        if known is not None:
+            some[:, ~basis.free] = np.asarray(known)[start : start + len(some), ~basis.free]
+        wanted = np.empty((len(some), onto.shape[1]))
+        for piece in _pieces(0, len(some)):
+            offsets = basis.offsets(frames, slice(start + piece.start, start + piece.stop))
+            wanted[piece] = (offsets - some[piece] @ basis.shapes_mm) @ (lift @ onto)
+        some[:, basis.free] = solve(shapes @ onto, wanted, basis.ridge[basis.free], fps=fps)
+        for piece in _pieces(first, stop):
+            offsets = basis.offsets(frames, piece)
+            followed = follow_gap(basis, some[piece.start - start : piece.stop - start], offsets)
+            off = (followed @ basis.shapes_mm - offsets).reshape(len(offsets), -1, 3)
+            weights.add(followed)
+            residual_mm.add(np.sqrt((off**2).sum(axis=2).mean(axis=1)))
+            let_go(np.asarray(frames))
+    return weights.whole(), residual_mm.whole()
+
+
+def _pieces(first: int, stop: int) -> list[slice]:
+    return [slice(start, min(start + BLOCK, stop)) for start in range(first, max(first + 1, stop), BLOCK)]
 
 
 def follow_gap(basis: MarkerBasis, weights: NDArray[np.float64], offsets_mm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from facesynth.face.animation import FaceAnimation
 from facesynth.face.rig.markers import LipGap
 from facesynth.inference.lips import bilabial_spans
+from facesynth.inference.long_arrays import by_blocks
 from facesynth.inference.speech import PhoneTrack
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
@@ -83,7 +84,7 @@ def with_closures_shown(shown: FaceAnimation, whole: FaceAnimation, lips: LipGap
     if shown.fps >= whole.fps or shown.names != ARKIT_NAMES:
         return shown
     weights = shown.weights.copy()
-    wide_mm, seen_mm = lips.opening_mm(whole.weights), lips.opening_mm(weights)
+    wide_mm, seen_mm = (by_blocks(lips.opening_mm, each, np.float64) for each in (whole.weights, weights))
     for first, last in bilabial_spans(phones, whole.fps):
         if first >= len(whole):
             continue

@@ -11,6 +11,7 @@ from facesynth.face.files.formats import SUFFIXES, write_animation
 from facesynth.face.files.livelink import COUNT, HEADER, read_livelink, take_of, write_livelink
 from facesynth.face.files.npz import read_npz
 from facesynth.face.rig.arkit_rig import PIVOT_MM
+from facesynth.inference import long_arrays
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Layout
 from facesynth.inference.motion import Motion
@@ -34,6 +35,17 @@ def test_same_animation_same_bytes(rig, tmp_path, suffix):
         write_animation(path, animation_at(), rig)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     assert sorted(tmp_path.iterdir()) == sorted(paths)
+
+
+def test_some_frames_at_a_time_give_the_same_take_and_the_same_other_rate(rig, tmp_path, monkeypatch):
+    whole, slower = animation_at(), animation_at().resampled(24.0)
+    write_livelink(tmp_path / "whole.csv", take_of(whole))
+    monkeypatch.setattr(long_arrays, "BLOCK_ROWS", 7)
+    write_animation(tmp_path / "pieces.csv", whole, rig)
+    assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    again = whole.resampled(24.0)
+    for name in ("weights", "head", "gaze"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(slower, name))
 
 
 def test_unknown_suffix_names_the_known_ones(rig, tmp_path):
