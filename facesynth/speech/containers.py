@@ -285,7 +285,7 @@ def _blocks(path: Path, found: _Decoded) -> Iterator[Floats]:
             if (frame.format.name, frame.layout.name, frame.sample_rate) != kind:  # it may change within a broadcast
                 yield from _resampled(resampler, None, found)
                 kind, layout = (frame.format.name, frame.layout.name, frame.sample_rate), layout or frame.layout
-                resampler = av.AudioResampler(format="fltp", layout=layout, rate=rate)
+                resampler = av.AudioResampler(format="flt", layout=layout, rate=rate)  # PyAV reads 8 separate planes at most
             yield from _resampled(resampler, frame, found)
         yield from _resampled(resampler, None, found)
 
@@ -295,7 +295,7 @@ def _resampled(resampler: Any, frame: Any, found: _Decoded) -> Iterator[Floats]:
         time_s = _time_s(block)
         found.times_s.append(np.nan if time_s is None else time_s)
         found.lengths.append(block.samples)
-        yield block.to_ndarray().T.astype(np.float32)
+        yield block.to_ndarray().reshape(block.samples, -1).astype(np.float32)
 
 
 def _frames(container: InputContainer, found: _Decoded) -> Iterator[Any]:

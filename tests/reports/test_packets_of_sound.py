@@ -177,3 +177,18 @@ def test_corpus_and_speak_say_so(tmp_path, talker):
     assert set(np.round(stored, 1)) == set(CLICKS_S) - {5.0}
     _, facts = bringing.spoken(talker, path, tmp_path, "--phones", tmp_path / "take.lab")
     assert any("gaps in the sound: 1, 1.00 s in all" in remark for remark in facts["remarks"])
+
+
+def test_more_than_eight_channels(tmp_path):
+    """As recorders of several microphones write them."""
+    import av
+
+    path, samples = tmp_path / "a.mka", np.zeros((RATE, 16), np.int16)
+    samples[RATE // 2 : RATE // 2 + 48] = 20000
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("pcm_s16le", rate=RATE, layout="16c")
+        frame = av.AudioFrame.from_ndarray(samples.reshape(1, -1), format="s16", layout="16c")
+        frame.rate, frame.pts = RATE, 0
+        for packet in (*stream.encode(frame), *stream.encode()):
+            container.mux(packet)
+    np.testing.assert_allclose(heard(path)[0], [0.5], atol=1e-4)
