@@ -132,7 +132,7 @@ def _head(document: gl.GLTF2) -> int | None:
     newer = ((extensions.get("VRMC_vrm") or {}).get("humanoid") or {}).get("humanBones") or {}
     older = next((bone.get("node") for bone in bones if bone.get("bone") == "head"), None)
     node = older if older is not None else (newer.get("head") or {}).get("node")
-    return node if isinstance(node, int) and 0 <= node < len(document.nodes) else None
+    return node if type(node) is int and 0 <= node < len(document.nodes) else None
 
 
 def _remarks(document: gl.GLTF2, buffers: Buffers, shown: set[int]) -> tuple[str, ...]:
