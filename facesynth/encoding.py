@@ -26,7 +26,9 @@ def text_of(path: Path, most: int | None = None) -> str:
     """The text of a file, or of its first `most` bytes, in any encoding; OSError and UnicodeDecodeError where there is none."""
     with open(path, "rb") as file:
         content = file.read() if most is None else file.read(most)
-    if most is not None and len(content) == most:
+    if most is not None and len(content) == most and b"\0" in content:
+        content = content[: most // 2 * 2]  # of two bytes a letter
+    elif most is not None and len(content) == most:
         content = content[: content.rfind(b"\n") + 1] or content  # a letter may be cut at the end
     return decoded(content)[0]
 

@@ -20,19 +20,20 @@ HEAD_BYTES = 1 << 20
 _LONGEST_QUOTE = 60
 _LOOKED_AT = 50
 """Rows that show how numbers are written."""
-MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
+MISSING = frozenset({"", "nan", "-nan", "nan(ind)", "-nan(ind)", "1.#ind", "-1.#ind", "1.#qnan", "na", "n/a", "null", "none"})
+"""Empty cells, and NaN as C's libraries write it."""
 
 
 def read_cells(path: Path, separator: str = "", decimal: str = "") -> tuple[list[str], NDArray[np.float64]]:
     """Names of the columns (none where the first line holds numbers), and the numbers [T, columns]; NaN for empty cells."""
-    rows = _rows(path, separator)
+    rows = without_idle_ends(_rows(path, separator))
     width = len(rows[0]) if rows else 0
     for number, row in enumerate(rows, start=1):
         if len(row) != width:
             raise FacesynthError(f"{path}, line {number}: {len(row)} cells, but {width} columns")
     point = decimal or _decimal(rows)
     named = not rows or not all(is_number(cell, point) or cell.lower() in MISSING for cell in rows[0])
-    columns, body = (rows[0] if rows else [], rows[1:]) if named else ([], rows)
+    columns, body = (rows[0] if rows else [], [row for row in rows[1:] if row != rows[0]]) if named else ([], rows)
     table = np.array([[_value(path, cell, point) for cell in row] for row in body], np.float64)
     return columns, table.reshape(len(body), width)
 
@@ -55,7 +56,7 @@ def is_number(text: str, decimal: str = ".") -> bool:
 
 def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]]:
     try:
-        with io.StringIO(text_of(path, HEAD_BYTES if most is not None else None), newline="") as file:
+        with io.StringIO(without_preamble(text_of(path, HEAD_BYTES if most is not None else None)), newline="") as file:
             first = file.readline()
             said = EXCEL.fullmatch(first.strip())
             sign = separator or (said[1] if said else separator_of(first))
@@ -69,6 +70,23 @@ def _rows(path: Path, separator: str, most: int | None = None) -> list[list[str]
             return rows
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FacesynthError(f"{path} cannot be read as CSV ({error}); export it again") from None
+
+
+def without_preamble(text: str) -> str:
+    """The text of a table without empty lines before it and without NUL characters."""
+    return re.sub(r"\A(?:[^\S\n]*\n)+", "", text.replace("\0", ""))
+
+
+def without_idle_ends(rows: list[list[str]]) -> list[list[str]]:
+    """Rows of a table without the empty cells that separators at the ends of its lines leave, also where names have none."""
+    names, body = rows[:1], rows[1:]
+    if not body or not names[0] or len({len(row) for row in body}) > 1 or any(row[-1] for row in body):
+        return rows
+    if len(body[0]) == len(names[0]) + 1:
+        return [*names, *(row[:-1] for row in body)]
+    if len(body[0]) == len(names[0]) > 1 and not names[0][-1]:
+        return without_idle_ends([row[:-1] for row in rows])
+    return rows
 
 
 def separator_of(line: str) -> str:

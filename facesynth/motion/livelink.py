@@ -19,7 +19,7 @@ from facesynth.encoding import decoded
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.motion.arkit_names import ARKIT_NAMES
-from facesynth.motion.cells import EXCEL
+from facesynth.motion.cells import EXCEL, without_idle_ends, without_preamble
 from facesynth.motion.timecode import PARTS_OF_A_SECOND, RATES, read_timecodes
 
 TIMECODE, COUNT = "Timecode", "BlendshapeCount"
@@ -90,7 +90,9 @@ def is_live_link(path: Path) -> bool:
     """Whether a table has the columns of a take, whatever their order, case and encoding."""
     try:
         with open(path, "rb") as file:
-            names = {_spelled(name).lower() for name in _cells(decoded(file.read(HEAD_BYTES))[0].splitlines()[:2])[0]}
+            names = {
+                _spelled(name).lower() for name in _cells(without_preamble(decoded(file.read(HEAD_BYTES))[0]).splitlines()[:2])[0]
+            }
     except (OSError, UnicodeDecodeError, csv.Error, IndexError):
         return False
     shapes = sum(name.lower() in names for name in WEIGHTS)
@@ -159,7 +161,8 @@ def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
     """Names of the columns, the rows below them, and what was noticed."""
     try:
         text, encoding = decoded(path.read_bytes())
-        header, *rows = _without_empty_columns(_cells(text.splitlines())) or [[]]
+        cells = without_idle_ends(_cells(without_preamble(text).splitlines())) or [[]]
+        header, rows = cells[0], [row for row in cells[1:] if row != cells[0]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FacesynthError(f"{path} cannot be read as a Live Link Face CSV ({error})") from None
     lower = [_spelled(name).lower() for name in header]
@@ -190,13 +193,6 @@ def _cells(lines: Sequence[str]) -> list[list[str]]:
     text = "\n".join(lines)
     text = _BARE_DROP_FRAME.sub(r'"\1"', text) if sign == ";" else text
     return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text), delimiter=sign) if row]
-
-
-def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
-    """Rows without what stands behind a sign at the end of every line."""
-    while rows and rows[0] and not rows[0][-1] and all(len(row) == len(rows[0]) and not row[-1] for row in rows):
-        rows = [row[:-1] for row in rows]
-    return rows
 
 
 def _letters(name: str) -> str:

@@ -6,6 +6,23 @@ from scipy.spatial.transform import Rotation
 COUNT = 120
 
 
+def changed(path, change, sign=",", encoding="utf-8"):
+    """An OpenFace table again after change(names, rows) gave other names and rows of text."""
+    names, *rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    names, rows = change(names, rows)
+    path.write_bytes(("\n".join(sign.join(row) for row in [names, *rows]) + "\n").encode(encoding))
+
+
+def without(*gone):
+    """A change that leaves columns out."""
+
+    def change(names, rows):
+        kept = [k for k, name in enumerate(names) if name.strip() not in gone]
+        return [names[k] for k in kept], [[row[k] for k in kept] for row in rows]
+
+    return change
+
+
 def openface(path, faces=1, flat=False):
     """A head that turns, with a face whose mouth opens; returns the face [T, 68, 3] in our axes and the head [T, 6]."""
     rng = np.random.default_rng(0)

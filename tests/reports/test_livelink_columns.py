@@ -165,3 +165,42 @@ def test_weights_of_any_table_in_per_cent(tmp_path, suffix):
         reading = read(path)
         np.testing.assert_allclose(reading.motion.frames, shares * np.array([1.0] * 20 + [40.0]), atol=1e-5)
         assert any("per cent" in remark for remark in reading.remarks) == (scale == 100)
+
+
+def header(change):
+    """A change of a take's first line."""
+    return lambda text: change(text.partition("\n")[0]) + text[text.index("\n") :]
+
+
+def each_line(change):
+    return lambda text: "".join(f"{change(number, line)}\n" for number, line in enumerate(text.splitlines()))
+
+
+DRESSED = {
+    "another capital": header(lambda line: line.replace("BlendshapeCount", "BlendShapeCount")),
+    "words": header(lambda line: re.sub("(?<=[a-z])(?=[A-Z])", " ", line).replace("Timecode", "Time Code")),
+    "underscores": header(lambda line: re.sub("(?<=[a-z])(?=[A-Z])", "_", line).lower()),
+    "the name of the face": header(lambda line: re.sub(r"(?<=,)(?=[EJMBCNTHLR])", "Face.", line)),
+    "a separator at the end": each_line(lambda _, line: f"{line},"),
+    "a separator behind the numbers": each_line(lambda number, line: f"{line}," if number else line),
+    "a column of notes": each_line(lambda number, line: f"{line},{'abc' if number else 'Note'}"),
+    "the header again": lambda text: text + text.partition("\n")[0] + "\n",
+    "empty lines before it": lambda text: "\n \n" + text,
+    "Excel's separator": lambda text: "sep=,\n" + text,
+    "NUL at the end": lambda text: text + "\0\0",
+    "quoted decimal commas": each_line(
+        lambda number, line: line if not number else re.sub(r"(-?\d+)\.(\d{10})", r'"\1,\2"', line)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", DRESSED)
+def test_the_same_take_after_other_programs(tmp_path, kind):
+    path = write(tmp_path / "a.csv", CODES, VALUES)
+    path.write_text(DRESSED[kind](path.read_text(encoding="utf-8")), encoding="utf-8")
+    assert is_live_link(path)
+    got, wanted = read(path), plain(tmp_path)
+    assert got.motion.layout.names == wanted.layout.names
+    np.testing.assert_allclose(got.motion.frames, wanted.frames, atol=1e-6)
+    np.testing.assert_allclose(got.motion.head, wanted.head, atol=1e-6)
+    assert any("columns that are no weights were left out: Note" in line for line in got.remarks) == ("notes" in kind)

@@ -98,11 +98,11 @@ def _c3d(path: Path, asked: Asked) -> Reading:
 def _csv(path: Path, asked: Asked) -> Reading:
     if is_live_link(path):
         return read_livelink_motion(path, asked.fps)
-    return read_openface(path) if is_openface(path) else _table(path, asked)
+    return read_openface(path, asked.fps) if is_openface(path) else _table(path, asked)
 
 
-def _json(path: Path, _: Asked) -> Reading:
-    return read_beat(path)
+def _json(path: Path, asked: Asked) -> Reading:
+    return read_beat(path, asked.fps)
 
 
 def _npz(path: Path, asked: Asked) -> Reading:

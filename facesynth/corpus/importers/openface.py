@@ -1,9 +1,11 @@
 """What OpenFace sees of a face in a video: 68 landmarks, head and gaze, a row a picture."""
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.corpus.importers.reading import Reading, motion_of_arrays, require_file
@@ -12,9 +14,11 @@ from facesynth.encoding import text_of
 from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.layout import Kind, Layout
-from facesynth.motion.cells import read_cells
+from facesynth.motion.cells import read_cells, separator_of, without_preamble
 
-FIRST = ("frame", "timestamp", "success")
+CONFIDENT = 0.5
+"""A face is found where OpenFace is so sure of it, in tables that do not say so otherwise."""
+MOST_BEFORE = 10**6
 POINTS = 68
 LONGEST_HEADER = 1 << 15
 """Bytes of its 714 names of columns are fewer."""
@@ -40,22 +44,26 @@ FULL_BLINK = 5.0
 def is_openface(path: Path) -> bool:
     """Whether a table has OpenFace's columns."""
     try:
-        first = text_of(path, LONGEST_HEADER).partition("\n")[0]
-        names = {name.strip() for name in next(csv.reader([first]), [])}
+        first = without_preamble(text_of(path, LONGEST_HEADER)).partition("\n")[0]
+        names = {_plain(name) for name in next(csv.reader([first], delimiter=separator_of(first)), [])}
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
-    return set(FIRST) <= names and ("X_0" in names or "x_0" in names)
+    return {"frame"} <= names and bool({"timestamp", "success", "confidence"} & names) and bool({"X_0", "x_0"} & names)
 
 
-def read_openface(path: Path) -> Reading:
+def read_openface(path: Path, fps: float | None = None) -> Reading:
     """Landmarks without the head's motion (mm in 3-D; else px in 2-D), head and gaze; NaN where OpenFace had no success.
 
-    Of several faces that with most successful rows is taken.
+    Of several faces that with most successful rows is taken, and those that are never seen beside it. Time begins with the
+    video. fps: its rate, if the rows have no times.
     """
     require_file(path)
-    columns, table = read_cells(path)
-    table, remarks = _one_face(path, columns, table)
-    seen = table[:, columns.index("success")] == 1
+    given, table = read_cells(path)
+    columns = [_plain(name) for name in given]
+    seen, doubts = _successes(path, columns, table)
+    times_s, counted = _times_s(path, columns, table, fps)
+    kept, remarks = _one_face(columns, table, seen, times_s)
+    table, seen, times_s = table[kept], seen[kept], times_s[kept]
     is_3d = _has(columns, _names("X", "Y", "Z"))
     points = _points(path, columns, table, ("X", "Y", "Z") if is_3d else ("x", "y"))
     head, eyes = _head(columns, table), _eyes(columns, table)
@@ -68,26 +76,70 @@ def read_openface(path: Path) -> Reading:
         )
     parts = [points.reshape(len(points), -1), *(part for part in (head, eyes) if part is not None)]
     signal = np.where(seen[:, None], np.concatenate(parts, axis=1), np.nan)
-    frames, fps, said = at_steady_rate(path, signal, table[:, columns.index("timestamp")])
+    frames, rate, said = at_steady_rate(path, *_from_zero(signal, times_s))
     if lost := np.count_nonzero(~seen):
         remarks.append(f"OpenFace had no success in {lost} of {len(seen)} pictures: they are gaps")
     width = parts[0].shape[1]
     own_head = frames[:, width : width + 6] if head is not None else None
     kind: Kind = "markers" if is_3d else "landmarks"
     layout = Layout(kind, tuple(f"landmark_{k}" for k in range(POINTS)), GROUPS, LIP_PAIRS)
-    motion = motion_of_arrays(path, frames[:, :width], fps, layout, own_head, frames[:, -3:] if eyes is not None else None)
-    return Reading(motion, remarks=(*remarks, *said))
+    motion = motion_of_arrays(path, frames[:, :width], rate, layout, own_head, frames[:, -3:] if eyes is not None else None)
+    return Reading(motion, remarks=(*doubts, *counted, *remarks, *said))
 
 
-def _one_face(path: Path, columns: list[str], table: Floats) -> tuple[Floats, list[str]]:
+def _plain(name: str) -> str:
+    """A name of a column without spaces, quotes and capitals; X is another axis than x."""
+    bare = name.strip().strip('"\ufeff').strip()
+    return bare if re.fullmatch(r"[xyzXYZ]_\d+|AU\d\d_[rc]|pose_[TR][xyz]", bare) else bare.lower()
+
+
+def _successes(path: Path, columns: list[str], table: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """[R] whether OpenFace found the face, and what was assumed."""
+    if "success" in columns:
+        return table[:, columns.index("success")] == 1, ()
+    if "confidence" in columns:
+        said = f"it has no column of success: rows of a confidence of {CONFIDENT:g} and more are taken"
+        return table[:, columns.index("confidence")] >= CONFIDENT, (said,)
+    return np.ones(len(table), bool), ("it has no columns of success and confidence: all rows are taken",)
+
+
+def _times_s(path: Path, columns: list[str], table: Floats, fps: float | None) -> tuple[Floats, tuple[str, ...]]:
+    """[R] seconds of each row: by its time, else by its number of a frame at a stated rate."""
+    times_s = table[:, columns.index("timestamp")] if "timestamp" in columns else np.zeros(len(table))
+    if np.ptp(times_s) > 0 or len(table) < 2:
+        return times_s, ()
+    if fps is None:
+        raise FacesynthError(f"{path} has no times, as OpenFace writes of pictures; give their rate (--fps)")
+    numbers = table[:, columns.index("frame")]
+    return (numbers - min(1.0, float(numbers.min()))) / fps, (f"it has no times: its frames stand at the stated {fps:g} fps",)
+
+
+def _one_face(columns: list[str], table: Floats, seen: NDArray[np.bool_], times_s: Floats) -> tuple[NDArray[np.bool_], list[str]]:
+    """[R] the rows of one face, and what a person should know."""
+    everybody = np.ones(len(table), bool)
     if "face_id" not in columns or not len(table):
-        return table, []
+        return everybody, []
     faces = table[:, columns.index("face_id")]
-    seen = table[:, columns.index("success")] == 1
-    known = np.unique(faces)
-    best = max(known, key=lambda face: np.count_nonzero(seen & (faces == face)))
-    said = [f"{len(known)} faces are in it: face_id {best:g} was taken, which is seen most"] if len(known) > 1 else []
-    return table[faces == best], said
+    known = sorted(np.unique(faces), key=lambda face: -np.count_nonzero(seen & (faces == face)))
+    if len(known) < 2:
+        return everybody, []
+    kept, joined = faces == known[0], [f"{known[0]:g}"]
+    for face in known[1:]:
+        if not np.isin(times_s[faces == face], times_s[kept]).any():
+            kept, joined = kept | (faces == face), [*joined, f"{face:g}"]
+    said = f"{len(known)} faces are in it: face_id {joined[0]} was taken, which is seen most"
+    more = f", and {', '.join(joined[1:])}, never seen beside it, as the same face found again" if joined[1:] else ""
+    return kept, [said + more]
+
+
+def _from_zero(signal: Floats, times_s: Floats) -> tuple[Floats, Floats]:
+    """Frames and times that begin with the video: where the face appears later, a gap stands before it."""
+    usual_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
+    before = round(times_s[0] / usual_s) if usual_s > 0 and times_s[0] > 0 else 0
+    if not 0 < before <= MOST_BEFORE:
+        return signal, times_s
+    early_s = times_s[0] - usual_s * np.arange(before, 0, -1)
+    return np.concatenate([np.full((before, signal.shape[1]), np.nan), signal]), np.concatenate([early_s, times_s])
 
 
 def _names(*axes: str) -> list[str]:
