@@ -39,8 +39,8 @@ def vertex_areas(points: NDArray[Any], quads: NDArray[Any]) -> NDArray[np.float3
 
 def pushed_together(points: NDArray[Any], quads: NDArray[Any], rest_areas: NDArray[np.float32]) -> NDArray[np.float32]:
     """[N] share of its area at rest that the skin around each point has lost, 0..1."""
-    lost: NDArray[np.float32] = 1 - vertex_areas(points, quads) / np.maximum(rest_areas, np.float32(1e-6))
-    return np.maximum(lost, np.float32(0))
+    left = vertex_areas(points, quads) / np.maximum(rest_areas, 1e-6)
+    return np.maximum(1 - left, 0).astype(np.float32)
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")

@@ -11,7 +11,7 @@ the eyes; profiles are read off along |x|.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from facesynth.motion.arkit_names import ARKIT_NAMES
 
@@ -77,13 +77,13 @@ def brow_line_mm(along: Field) -> Field:
     return line
 
 
-def step(low: ArrayLike, high: ArrayLike, x: Field) -> Field:
+def step(low: float | Field, high: float | Field, x: Field) -> Field:
     """Smoothly from 0 at low to 1 at high; high may be the smaller."""
-    t = np.clip((x - low) / np.subtract(high, low), 0.0, 1.0)
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
     smooth: Field = t * t * (3 - 2 * t)
     return smooth
 
 
-def _around(over: Field, top: float, above: float, bottom: ArrayLike, below: float) -> Field:
+def _around(over: Field, top: float, above: float, bottom: float | Field, below: float) -> Field:
     """1 on the brow's line, 0 from `top` and `bottom` on; whole between `below` and `above`."""
     return np.where(over > 0, step(top, above, over), step(bottom, below, over))
