@@ -180,6 +180,16 @@ def test_teeth_on_a_jaw_are_told_and_a_mapping_turns_the_joint(tmp_path, said):
     np.testing.assert_allclose(again.rest_mm, own.rest_mm, atol=0.01)
 
 
+@pytest.mark.parametrize("jaw", ["jaw", "J_Bip_C_Jaw", "mandible", "Chin_J", "あご"])
+def test_jaws_by_other_names_are_told_as_well(tmp_path, jaw):
+    def change(document, data):
+        teeth_on_a_jaw(document, data)
+        document.nodes[-2].name = jaw
+
+    told = load_own_head(head(tmp_path / "teeth.glb", change)).remarks
+    assert any(f"Teeth hang on the joint {jaw}, which no channel turns" in line for line in told)
+
+
 @pytest.mark.parametrize(
     ("joint", "said_of_it"),
     [("{from: jawOpen, turn: 20}", "turn is degrees"), ("{from: jawOpen, turn: [1, 2, x]}", "must be a number")],

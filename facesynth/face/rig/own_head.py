@@ -29,7 +29,7 @@ MOVED_SHARE = 0.05
 """A vertex belongs to the face if a shape moves it by this share of the largest movement."""
 USUAL_JAW_DEG = 20
 """A jaw that is open as far as it goes."""
-_JAW = re.compile(r"jaw", re.IGNORECASE)
+_JAW = re.compile(r"jaw|mandib|chin|あご|顎|下巴|kiefer", re.IGNORECASE)
 _EYE = re.compile(r"eye(?!.*(lash|brow|lid|socket|occl|wet|shadow|tear|blink|liner))", re.IGNORECASE)
 SUFFIXES = (".glb", ".gltf", ".vrm")
 
