@@ -71,7 +71,7 @@ def _read_table(name: str) -> dict[str, tuple[str, ...]]:
 
 _MONEY = _read_table("currencies.csv")
 """Unit and its hundredth, by sign and by code."""
-_UNITS = {sign: unit for sign, (unit,) in _read_table("units.csv").items()}
+_UNITS = {sign.casefold(): unit for sign, (unit,) in _read_table("units.csv").items()}
 _RATES = {"yr": "year", "mo": "month", "wk": "week", "hr": "hour", "sq": "square"}
 """Short forms that stand behind a stroke alone, beside those of `_UNITS`."""
 _WHOLE = [*_UNITS.values(), *(unit for unit, _ in _MONEY.values())]
@@ -88,7 +88,7 @@ def numbers_written_out(text: str) -> str:
         text = re.sub(pattern, lambda match, said=said: f" {said(match)} ", text, flags=re.IGNORECASE)  # type: ignore[misc]
         text = re.sub(" {2,}", " ", text)
     text = re.sub(r"(?<=[a-z]) +(?='s\b)", "", text)
-    return re.sub(_attributes(), lambda match: f"{match[1]}{_SINGULAR[match[2].lower()]} ", text)
+    return re.sub(_attributes(), lambda match: f"{match[1]}{_SINGULAR[match[2].casefold()]} ", text)
 
 
 def _signs_plain(text: str) -> str:
@@ -161,13 +161,13 @@ def _rules() -> tuple[Rule, ...]:
         (rf"([{symbols}])\s?(\d+)\s(\d+)/(\d+)(?:{_SCALE})?", lambda m: _part_money(m[1], m[2], m[3], m[4], m[5] or m[6])),
         (rf"(?<![\w)])-(?=[{symbols}]?\.?\d)", lambda m: "minus"),
         (rf"(?:\b([a-z]{{1,2}}))?([{symbols}])\s?({_N})(?:{_SCALE})?", lambda m: _money(m[2], m[3], m[4] or m[5], m[1])),
-        (rf"({_N})(?:{_SCALE})?\s?([{symbols}]|(?:{codes})\b)", lambda m: _money(m[4].lower(), m[1], m[2] or m[3], None)),
-        (rf"\b({codes})\.?\s?({_N})(?:{_SCALE})?", lambda m: _money(m[1].lower(), m[2], m[3] or m[4], None)),
+        (rf"({_N})(?:{_SCALE})?\s?([{symbols}]|(?:{codes})\b)", lambda m: _money(m[4].casefold(), m[1], m[2] or m[3], None)),
+        (rf"\b({codes})\.?\s?({_N})(?:{_SCALE})?", lambda m: _money(m[1].casefold(), m[2], m[3] or m[4], None)),
         (r"\b([1-9])\s?'\s?(\d{1,2})(?:\"|''|”)?(?!\w)", lambda m: f"{cardinal(m[1])} foot {cardinal(m[2])}"),
         (r"(?<!\w)'(\d)0s\b", lambda m: _decade(f"{m[1]}0")),
         (r"(?<=\bin )(10[1-9]\d)\b", lambda m: _year(m[1])),
         (r"\b(1[1-9]\d0|20\d0|[2-9]0)'?s\b", lambda m: _decade(m[1])),
-        (rf"({_N})\s?({spatial})", lambda m: _counted(m[1], _UNITS[m[2].lower()])),
+        (rf"({_N})\s?({spatial})", lambda m: _counted(m[1], _UNITS[m[2].casefold()])),
         (r"(\d+|[a-z])(⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda m: f"{m[1]} {_power(m[2].translate(_RAISED))}"),
         (rf"({_N})\s?[-–]\s?(?=\d+\s+\d+/\d|(?:{_N})\s?[%‰°])", lambda m: f"{m[1]} to"),
         (rf"\b(\d+)\s+(\d+)/(\d+)\b(?:\s?({units})(?![\w']))?", lambda m: _mixed(m[1], m[2], m[3], _unit(m[4]))),
@@ -185,7 +185,7 @@ def _rules() -> tuple[Rule, ...]:
         (r"\b(\d+)/(\d+)\b", lambda m: _fraction(m[1], m[2])),
         (r"\b(\d[\d,]*)(?:st|nd|rd|th)\b", lambda m: ordinal(m[1])),
         (r"(?<=[a-z])(\d+)s\b", lambda m: _decade(m[1]) if m[1][0] != "0" else m[0]),
-        (rf"({_N})\s?({units})(?![\w'])", lambda m: _counted(m[1], _UNITS[m[2].lower()]) if _is_unit(m) else m[0]),
+        (rf"({_N})\s?({units})(?![\w'])", lambda m: _counted(m[1], _UNITS[m[2].casefold()]) if _is_unit(m) else m[0]),
         (r"\b(\d+)\.(\d+)\.(\d+)\b", lambda m: " point ".join(cardinal(part) for part in m.groups())),
         (rf"({_N})(?:x|×|\sx\s)(?=\d)", lambda m: f"{m[1]} by"),
         (rf"({_N})(?:x|×)(?!\w)", lambda m: f"{cardinal(m[1])} times"),
@@ -266,11 +266,11 @@ def _is_rate(text: str) -> bool:
 
 
 def _rate(amount: str, unit: str) -> str:
-    return f"{amount} per {_UNITS.get(unit.lower()) or _RATES.get(unit.lower(), unit)}"
+    return f"{amount} per {_UNITS.get(unit.casefold()) or _RATES.get(unit.lower(), unit)}"
 
 
 def _unit(short: str | None) -> str | None:
-    return "percent" if short == "%" else _UNITS[short.lower()] if short else None
+    return "percent" if short == "%" else _UNITS[short.casefold()] if short else None
 
 
 def _mixed(whole: str, top: str, bottom: str, unit: str | None) -> str:

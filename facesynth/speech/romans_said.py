@@ -16,7 +16,7 @@ _RULERS = (
 )
 _ROMAN = r"(?=[IVXL]{2,}\b|[VX]\b)(XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
 _YEAR = r"\b(?=[MDCLXVI]{4,}\b)(M{1,2})(CM|CD|D?C{0,3})(XC|XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
-_VALUES = {"I": 1, "V": 5, "X": 10, "L": 50, "C": 100, "D": 500, "M": 1000}
+_VALUES = {"I": 1, "İ": 1, "V": 5, "X": 10, "L": 50, "C": 100, "D": 500, "M": 1000}
 
 
 def romans_written_out(text: str) -> str:

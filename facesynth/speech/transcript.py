@@ -62,7 +62,7 @@ def left_out(text: str) -> tuple[str, ...]:
 
 def _abbreviations_written_out(text: str) -> str:
     def full(match: re.Match[str]) -> str:
-        short, following = match[1].lower(), match.string[match.end() :]
+        short, following = match[1].casefold(), match.string[match.end() :]
         if short in _UNITS and re.search(r"\d\s?$", match.string[: match.start()]):
             return match[0].rstrip(".")
         if short in _ONLY_BEFORE_A_NUMBER and not re.match(r"\s*(?:\d|[IVX]{2,}\b|[VX]\b)", following):

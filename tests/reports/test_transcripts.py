@@ -1,9 +1,11 @@
 """Transcripts as people write them: each line of transcripts.txt beside the words that a person says."""
 
 import json
+import re
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from bringing import added, corpus_of, lay_down, run, spoken, talker
 
@@ -110,3 +112,22 @@ def test_long_runs_of_signs_take_no_time_of_their_own(junk):
     started_s = time.process_time()
     words_of(junk)
     assert time.process_time() - started_s < 5
+
+
+def test_no_row_of_signs_is_a_traceback():
+    """Letters that fold to others (μ and µ, ſ and s, K) among digits, signs of money, units and marks."""
+    signs = [
+        *"0123456789.,:/-–'\"’″°%$€£¥₿½¾²³⁰⁹₂μµſKΩωßİıIVXivx()[]<>@#&*+=~^_ \n",
+        " kg",
+        "μL",
+        "5 ſ",
+        "zł",
+        "ZŁ",
+        "SEK",
+        " and ",
+        "st",
+    ]
+    rng = np.random.default_rng(3)
+    for _ in range(400):
+        for word in words_of("".join(rng.choice(signs, rng.integers(1, 25)))):
+            assert re.fullmatch("[a-z']+", word)
