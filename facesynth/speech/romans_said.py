@@ -14,7 +14,7 @@ _RULERS = (
     "Alfonso|Ferdinand|Frederick|Christian|Gustav|Karl|Carl|Haakon|Olav|Harald|Sixtus|Alexander|Ramses|Ptolemy|Mohammed|Mehmed|"
     "Murad|Otto|Ludwig|Wilhelm|Friedrich|Baldwin|Boniface|Nicholas|Constantine|Leopold|Albert|Rama|Robert|John|Stephen|Darius"
 )
-_ROMAN = r"(?=[IVXL]{2,}\b|[VX]\b)(XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
+_ROMAN = r"(?=[IVXL]{2,}\b|[VX]\b)(XL|L?X{0,3})(IX|IV|V?I{0,3})(?<=\w)\b"
 _YEAR = r"\b(?=[MDCLXVI]{4,}\b)(M{1,2})(CM|CD|D?C{0,3})(XC|XL|L?X{0,3})(IX|IV|V?I{0,3})\b"
 _VALUES = {"I": 1, "İ": 1, "V": 5, "X": 10, "L": 50, "C": 100, "D": 500, "M": 1000}
 

@@ -128,6 +128,7 @@ def test_no_row_of_signs_is_a_traceback():
         "st",
     ]
     rng = np.random.default_rng(3)
+    assert words_of("Chapter IIII, part XXL, 5 μL")[-2:] == ("five", "microliters")
     for _ in range(400):
         for word in words_of("".join(rng.choice(signs, rng.integers(1, 25)))):
             assert re.fullmatch("[a-z']+", word)
