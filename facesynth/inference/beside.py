@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .arrays import Floats
 from .coarticulation.model import coarticulation_of
 from .folder import Folder
+from .long_arrays import Growing, let_go, row_blocks
 from .motion import Motion
 from .speech import Speech
 
@@ -31,8 +32,11 @@ class Beside:
 
     def mixed(self, frames: Floats, speech: Speech) -> Floats:
         """[T, C] the mean of frames [T, C] and what it says of the same speech."""
-        other = self.synthesize(speech).frames.astype(np.float64)
-        return frames + self.share * (other - frames)
+        other, parts = self.synthesize(speech).frames, Growing(np.float64)
+        for rows in row_blocks(frames):
+            parts.add(frames[rows] + self.share * (other[rows].astype(np.float64) - frames[rows]))
+            let_go(other)
+        return parts.whole()
 
 
 def exported_beside(folder: Folder, arrays: Mapping[str, NDArray[Any]], threads: int) -> Beside | None:
