@@ -25,17 +25,17 @@ Word = tuple[str, Pronunciation]
 """As it is written, and its phones."""
 
 WORST_FIT = -2.25
-"""Mean logarithm of the phones' probabilities below which a text is another sound's. Of 40 real clips with their own words the
-least was -1.2, of 106 with another sentence's the best -2.35; of 18 sentences in as many languages by a synthetic voice the least
-was -2.1."""
+"""Mean logarithm of the phones' probabilities below which a text is another sound's. Of 80 real clips with their own words the
+least is -1.4, with a sentence of another language the best -2.7; sentences that share half of their words may pass
+(benchmarks/phone_thresholds.py). Of 18 sentences in as many languages by a synthetic voice the least was -2.1."""
 BEYOND_CHANCE = 0.5
-"""By how much the fit must exceed that of the same phones in random order: by 1.4 and more in the real clips, by 0.58 and more
+"""By how much the fit must exceed that of the same phones in random order: by 1.36 and more in the real clips, by 0.58 and more
 with the synthetic voice, by less than 0.43 in 95 of 100 trials of its sentences with each other's words."""
 SHUFFLES, SHUFFLED = 8, (10, 400)
 """How often, and from how many phones on; more than the second are not needed to tell."""
 DOUBTFUL, SHORTEST_WORD = -3.0, 3
-"""A word of so many phones or more with a fit below this is told as one that does not fit: 0.8 % of the words of the 40 clips,
-90 % of those that were put in place of one."""
+"""A word of so many phones or more with a fit below this is told as one that does not fit: 1.9 % of the words of the 80 clips,
+79 % of those that were put in place of one."""
 INSIDE_S = 0.4
 """Silence inside a word is a long sound, not a pause, up to this length."""
 PIECE_FRAMES = 3000
