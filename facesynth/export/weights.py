@@ -14,7 +14,7 @@ from facesynth.inference.errors import unknown
 Weights = Literal["float32", "float16", "int8"]
 LARGE = 1024
 """Constants of fewer numbers stay as they are, and so do vectors: one of 8 bits would shift the face."""
-SMALLER_ARRAYS = ("node_frames", "frames", "features")
+SMALLER_ARRAYS = ("node_frames", "frames", "features", "residual_frames")
 """Arrays of a database that may be kept in fewer bits."""
 
 

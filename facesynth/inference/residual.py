@@ -148,4 +148,5 @@ def exported_residual(folder: Folder, arrays: Mapping[str, NDArray[Any]]) -> Res
     if share == 0:
         return None
     frames, basis, level, bounds, emotions = (arrays[f"residual_{name}"] for name in ARRAYS)
+    frames = frames.astype(np.float32, copy=False) * arrays.get("residual_frames_scale", np.float32(1))
     return ResidualMotion(frames, basis, level, bounds, emotions, float(folder.manifest["fps"]), share)
