@@ -70,10 +70,11 @@ def test_the_default_model_streams_by_its_name_and_one_that_cannot_says_so():
         facesynth.load("grid-s1").stream()
 
 
-def test_all_models_of_the_package_are_small_enough_to_come_with_it_and_nothing_comes_twice():
+def test_all_models_of_the_package_are_small_enough_to_come_with_it_and_nothing_large_comes_twice():
     contents = [path.read_bytes() for path in PACKAGED.rglob("*") if path.is_file()]
     assert sum(map(len, contents)) < 15e6
-    assert len(set(contents)) == len(contents)
+    large = [content for content in contents if len(content) > 100_000]
+    assert len(set(large)) == len(large)
 
 
 def test_what_several_models_have_alike_goes_with_each_that_is_copied_or_sent(tmp_path, own_cache):
@@ -120,7 +121,8 @@ def speech_of_lips():
     from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 
     phones = PhoneTrack(("pau", "m", "aa", "pau"), np.array([0.2, 0.3, 0.5, 0.7]))
-    return Speech(np.zeros(11200, np.float32), 16000, phones, EmotionTrack.constant("neutral", 0.7))
+    sound = 0.1 * np.random.default_rng(0).standard_normal(11200).astype(np.float32)
+    return Speech(sound, 16000, phones, EmotionTrack.constant("neutral", 0.7))
 
 
 def test_an_extra_that_is_missing_is_named(tmp_path):
