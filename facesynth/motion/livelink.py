@@ -271,7 +271,7 @@ def _placed(
         if fps is None:
             raise FacesynthError(f"{path}: the time codes do not increase; give the rate (--fps)")
         return np.arange(len(times_s)), fps
-    usual = float(np.median(forward))
+    usual = _usual_step(forward)
     count = np.rint(steps / usual).sum()
     span_s = float(times_s[-1] - times_s[0])
     rate = _exact(float(count) / span_s, counted, span_s)
@@ -279,6 +279,12 @@ def _placed(
     if frames[-1] > LARGEST_GAP * len(frames) + 1000:
         raise FacesynthError(f"{path}: the time codes jump by hours, from {timecodes[0]} to {timecodes[-1]}; export it again")
     return np.maximum.accumulate(frames), fps if fps is not None and abs(fps / rate - 1) < 1e-3 else rate
+
+
+def _usual_step(steps: Floats) -> float:
+    """Seconds from a row to the next: the mean of those near their median, for clocks run ahead often and fall back seldom."""
+    median = float(np.median(steps))
+    return float(steps[np.abs(steps - median) < median / 2].mean())
 
 
 def _exact(rate: float, counted: int, span_s: float) -> float:

@@ -48,6 +48,8 @@ LATEST = {"aac": 2112, "mp3": 1682}
 """Samples that some encoder puts in front."""
 BESIDE_PICTURES = frozenset({"aac", "mp3"})
 """Codecs whose containers show by the pictures' time stamps whether they leave that in."""
+LAYER, LAYER_2 = 0b110, 0b100
+"""Bits of the second byte of MPEG audio, and what they are in MP2."""
 SKIPPED = "skip_samples"
 """What FFmpeg notes on the first packet of a sound whose file says how much priming there is."""
 LINKED = "ogg"
@@ -195,6 +197,7 @@ def beginning(path: Path) -> Beginning:
         if rate < LOWEST_HZ:
             raise FacesynthError(f"{path} states a sound of {rate} Hz, or one of a kind that is not known; is it damaged?")
         codec = next((name for name in PRIMED if codec.startswith(name)), codec)
+        codec = "mp2" if codec == "mp3" and _is_layer_2(path) else codec
         name, sounds = container.format.name, len(container.streams.audio)
         if name == COUNTING and picture is not None:
             return replace(_counted(container, PRIMED.get(codec, 0), rate, codec), sounds=sounds)
@@ -224,6 +227,15 @@ def _counted(container: InputContainer, priming: int, rate: int, codec: str) -> 
     seen_s = unit_s * (empty if held_back else first)
     sound_s = seen_s - late_s if held_back else -late_s
     return Beginning(sound_s, seen_s, priming, rate, codec, counted=True, later_s=sound_s)
+
+
+def _is_layer_2(path: Path) -> bool:
+    """Whether the first packet's header names layer II: MPEG-TS calls the sound of all layers alike, its decoder takes all."""
+    import av
+
+    with av.open(str(path)) as container:
+        head = next((bytes(packet)[:2] for packet in container.demux(audio=0) if packet.size), b"")
+    return len(head) == 2 and head[0] == 0xFF and head[1] & LAYER == LAYER_2
 
 
 def _first_frame(container: InputContainer, streams: Sequence[Any]) -> tuple[Any, bool]:

@@ -16,6 +16,8 @@ _WORDS = re.compile(r"words?|(?<![a-z])tokensalign|^ort(?:-mau)?(?![a-z])|(?<![a
 _CONFIDENCES = re.compile(r"confidences?")
 _BETWEEN = " \t\u00a0\u202f-\u2010\u2011\u2012\u2013\u2014\u2212_@:\uff1a./|#,;&+=~\u00b7\u30fb"
 """Between the name of a speaker and that of a kind of tier."""
+_EMPTY_BRACKETS = re.compile(r"[(\[{<]\s*[)\]}>]")
+"""What is left of `Anna (phones)`."""
 
 NO_LENGTH_S = 1e-6
 LARGEST_OVERLAP_S = 0.01
@@ -102,7 +104,7 @@ def _by_speaker(tiers: Sequence[Tier], kind: re.Pattern[str]) -> dict[str, Tier]
         if match is None:
             continue
         rest = f"{tier.name[: match.start()].rstrip(_BETWEEN)} {tier.name[match.end() :].lstrip(_BETWEEN)}"
-        name = re.sub(r"^[(\[{]+|[)\]}]+$", "", rest.strip(_BETWEEN)).strip(_BETWEEN)
+        name = re.sub(r"^[(\[{]+|[)\]}]+$", "", _EMPTY_BRACKETS.sub("", rest).strip(_BETWEEN)).strip(_BETWEEN)
         name = spelt.setdefault(name.lower(), name)
         number = 2
         while name in found:

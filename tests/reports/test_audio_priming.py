@@ -43,6 +43,7 @@ def test_priming_that_is_known_is_taken_off_without_a_word(tmp_path, suffix):
         ("a.mp3", "libmp3lame"),
         ("a.mp2", "mp2"),
         ("c.ts", "ac3"),
+        ("d.ts", "mp2"),
         ("a.eac3", "eac3"),
     ],
 )

@@ -31,6 +31,17 @@ def test_lost_rows_are_gaps_at_their_time(tmp_path, fps):
     assert reading.remarks == ("15 of 180 frames have no row by the time codes: they are gaps",)
 
 
+def test_lost_rows_of_a_clock_that_runs_ahead_and_falls_back(tmp_path):
+    """Most steps are 1.037 frames long, some 0.837: a gap of 15 frames is still 15 frames."""
+    codes, values = timecodes_of(COUNT), values_of(COUNT)
+    codes = [f"{code.partition('.')[0]}.{400 + 37 * k % 200}" for k, code in enumerate(codes)]
+    kept = np.setdiff1d(np.arange(COUNT), np.arange(40, 55))
+    reading = read(write(tmp_path / "a.csv", [codes[k] for k in kept], values[kept]))
+    assert reading.motion.fps == pytest.approx(60, rel=2e-4)
+    np.testing.assert_allclose(jaw(reading.motion)[kept], kept / COUNT, atol=1e-6)
+    assert reading.remarks == ("15 of 180 frames have no row by the time codes: they are gaps",)
+
+
 @pytest.mark.parametrize("doubled", [[10, 11, 90], list(range(COUNT))])
 def test_rows_that_are_there_twice_are_read_once(tmp_path, doubled):
     codes, values = timecodes_of(COUNT), values_of(COUNT)

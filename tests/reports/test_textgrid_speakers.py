@@ -19,6 +19,7 @@ NAMES = [
     ("words (Anna)", "phones (Anna)", "words (Bela)", "phones (Bela)"),
     ("ORT-MAU_Anna", "MAU_Anna", "ORT-MAU_Bela", "MAU_Bela"),
     ("word@Anna", "phon@Anna", "word@Bela", "phon@Bela"),
+    ("Anna (words)", "Anna (phones)", "Bela [words]", "Bela [ phones ]"),
 ]
 OTHER_NAMES = [
     ("{} \N{EN DASH} words", "{} \N{EN DASH} phones", "Anna", "Bela"),

@@ -154,7 +154,7 @@ def length_of(reader: Any, form: Form, size: int) -> tuple[int, tuple[str, ...]]
     wrapped = next((count for count in counts for length in stated if length < FULL and (count - length) % (FULL + 1) == 0), None)
     if whole > FULL and (wrapped is not None or FULL in stated):
         count = wrapped or whole
-        return count, (f"the header cannot count its {count} frames; the size of the file tells them",)
+        return count, ("the header cannot count so many frames; the size of the file tells them",)
     fitting = [length for length in stated if 0 < length <= whole]
     if fitting:
         return fitting[0], ()
