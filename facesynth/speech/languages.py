@@ -15,7 +15,7 @@ from facesynth.speech.directions import without_directions
 from facesynth.speech.folding import cleaned
 from facesynth.speech.ipa_words import phones_of_ipa
 from facesynth.speech.phone_labels import normalise_phone
-from facesynth.speech.pronunciation import Pronunciation
+from facesynth.speech.pronunciation import Pronunciation, is_known
 
 ENGLISH = "en"
 JAPANESE, MANDARIN = "ja", "zh"
@@ -31,6 +31,8 @@ _SHARED = frozenset(["ru", "ar", "hi"])
 _SURE = 15.0
 """By how much the logarithm of another language's probability must exceed that of English: of 16 English lines the most was 9,
 of lines of five words in eight other languages the least was 30."""
+_SURER = 2 * _SURE
+"""The same, where every word is an English one, too (`papa mama` looks like Quechua), or nobody here could pronounce it."""
 _MANY = ("ar", "de", "es", "fr", "hi", "it", "ja", "ko", "pt", "ru", "tr", "zh")
 _BLOBS = "g2p2_group_"
 """Begins the names of the packages that hold the words of a family of languages."""
@@ -89,7 +91,8 @@ def require_covered(code: str) -> None:
         raise FacesynthError(f"texts in the language {code!r} need other packages: pip install 'facesynth[languages]'")
     raise FacesynthError(
         f"texts in the language {code!r} cannot be pronounced here, those in English and {len(covered_languages())} others can"
-        f" (ISO 639-1: {', '.join(_MANY)} …); leave the text out to have the phones heard, or give the phones"
+        f" (ISO 639-1: {', '.join(_MANY)} …); say `--language` if it is another, leave the text out to"
+        " have the phones heard, or give the phones"
     )
 
 
@@ -176,11 +179,14 @@ def _is_said(letter: str) -> bool:
 
 
 def _by_trigrams(text: str, otherwise: str) -> str:
-    """The likeliest language, where it is much likelier than `otherwise`."""
+    """The likeliest language, where it is much likelier than `otherwise`; a word that is repeated says it once."""
     if find_spec("py3langid") is None:
         return otherwise
     import py3langid
 
-    logarithms = dict(py3langid.rank(text))
+    words = list(dict.fromkeys(_words(text.lower())))
+    logarithms = dict(py3langid.rank(" ".join(words)))
     best = max(logarithms, key=logarithms.__getitem__)
-    return str(best) if logarithms[best] > logarithms[otherwise] + _SURE else otherwise
+    is_english = otherwise == ENGLISH and all(map(is_known, words))
+    needed = _SURER if is_english or best not in covered_languages() else _SURE
+    return str(best) if logarithms[best] > logarithms[otherwise] + needed else otherwise

@@ -16,7 +16,7 @@ from facesynth.face.files.formats import SUFFIXES, require_arkit, write_animatio
 from facesynth.face.rig.arkit import arkit_columns
 from facesynth.face.rig.arkit_rig import Rig
 from facesynth.face.rig.markers import LipGap
-from facesynth.face.solve.animate import animate
+from facesynth.face.solve.animate import animate, with_close_within_jaw
 from facesynth.face.solve.closures import with_closures_shown
 from facesynth.inference.errors import unknown
 from facesynth.inference.layout import Layout
@@ -130,8 +130,9 @@ class HeadStage:
             phones=speech.phones,
             eyes=face.eyes,
         )
-        shown = whole.resampled(float(asked.fps or FPS))
-        animation = replace(with_closures_shown(shown, whole, LipGap.of(self.rig), speech.phones), sources=face.sources)
+        shown, lips = whole.resampled(float(asked.fps or FPS)), LipGap.of(self.rig)
+        shown = with_close_within_jaw(with_closures_shown(shown, whole, lips, speech.phones), lips)
+        animation = replace(shown, sources=face.sources)
         skin = self._skin(face.motion, animation)
         return Performance(speech, face.motion, animation, self.own or self.rig, asked.size or SIZE, skin)
 

@@ -43,6 +43,10 @@ def test_rounded_front_vowels_are_rounded():
         ("Yes.", "en"),
         ("", "en"),
         ("My name is Inigo Montoya.", "en"),
+        ("papa mama", "en"),  # Quechua by its trigrams
+        ("Ma, ma, ma! Pa, pa, pa!", "en"),
+        ("La la la.", "en"),
+        ("aba ebe ibi", "en"),
         ("Le petit garçon mange une pomme.", "fr"),
         ("Die Katze schläft heute im Garten.", "de"),
         ("Маленький мальчик играет с мячом.", "ru"),

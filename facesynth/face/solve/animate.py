@@ -1,6 +1,8 @@
 """From a motion to an animation of the built-in head."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,13 +60,20 @@ def close_within_jaw(weights: ArrayLike, lips: LipGap) -> NDArray[np.float64]:
     """Weights [T, 52] whose mouthClose is nowhere above jawOpen, with lips as near as they were."""
     values = np.array(weights, np.float64)
     excess = np.maximum(values[:, CLOSE] - values[:, JAW], 0)
-    values[:, CLOSE] -= excess
+    values[:, CLOSE] = np.minimum(values[:, CLOSE], values[:, JAW])
     slopes_mm = lips.slopes_mm[MIDDLE_LIPS].mean(axis=0)
     parting = [i for i in np.flatnonzero(slopes_mm > 0) if i != JAW]
     open_mm = values[:, parting] @ slopes_mm[parting]
     missing_mm = excess * -slopes_mm[CLOSE]
     values[:, parting] *= 1 - np.clip(missing_mm / np.maximum(open_mm, 1e-9), 0, 1)[:, None]
     return values
+
+
+def with_close_within_jaw(animation: FaceAnimation, lips: LipGap) -> FaceAnimation:
+    """An animation of ARKit's shapes with `close_within_jaw` in every frame; one of other channels as it is."""
+    if animation.names != ARKIT_NAMES:
+        return animation
+    return replace(animation, weights=by_blocks(partial(close_within_jaw, lips=lips), animation.weights, np.float32))
 
 
 TIP_UP: Mapping[str, float] = {
