@@ -109,11 +109,12 @@ def read_take(path: Path, fps: float | None = None) -> Take:
     timecodes = [row[names.index(TIMECODE)].strip() for row in rows]
     columns = [k for k, name in enumerate(names) if name not in (TIMECODE, COUNT)]
     others = [k for k in columns if names[k] not in (*WEIGHTS, *ANGLES)]
-    left_out = [k for k in others if not all(_is_share(row[k]) for row in rows)]
+    left_out = [k for k in others if not _holds_shares([row[k] for row in rows])]
     columns = [k for k in columns if k not in left_out]
     if left_out:
         remarks.append(f"columns that are no weights were left out: {', '.join(header[k][:40] for k in left_out[:5])}")
     values = _numbers(path, rows, columns)
+    values, of_gaps = _without_lost_faces(path, values, [row[names.index(COUNT)] for row in rows] if COUNT in names else [])
     if any(row[k].endswith("%") for row in rows[:1] for k in columns):
         remarks.append("its cells are in per cent: they were divided by 100")
     named = tuple(names[k] for k in columns)
@@ -122,20 +123,36 @@ def read_take(path: Path, fps: float | None = None) -> Take:
     times_s, counted = read_timecodes(path, timecodes, fps)
     times_s, of_parts = _parted(times_s, values, counted)
     frames, rate = _placed(path, timecodes, times_s, counted, fps)
-    remarks += said + of_angles + of_parts + _lost_and_doubled(frames, values)
+    remarks += of_gaps + said + of_angles + of_parts + _lost_and_doubled(frames, values)
     if fps is None and len({code[:8] for code in timecodes}) == 1:
         remarks.append(f"the time codes stay within one second: they were taken for a whole second of {counted} fps")
     return Take(tuple(timecodes), named, values, frames, rate, tuple(remarks))
 
 
-def _is_share(cell: str) -> bool:
-    """Whether a cell holds a number as weights are."""
-    return _NUMBER.fullmatch(cell) is not None and abs(_number(cell)) <= PER_CENT
+def _holds_shares(cells: list[str]) -> bool:
+    """Whether a column holds numbers as weights are; cells of a face that was lost are empty."""
+    full = [cell for cell in cells if cell]
+    return bool(full) and all(_NUMBER.fullmatch(cell) is not None and abs(_number(cell)) <= PER_CENT for cell in full)
+
+
+def _without_lost_faces(path: Path, values: Floats, counts: list[str]) -> tuple[Floats, list[str]]:
+    """Values [R, N] with NaN in rows that count no shapes while others do, and what was found missing."""
+    empty = np.array([count == "0" for count in counts] or [False] * len(values))
+    values = np.where(empty[:, None] & (not empty.all()), np.nan, values)
+    missing = np.isnan(values)
+    lost = missing.all(axis=1)
+    if lost.all():
+        raise FacesynthError(f"{path} holds no values in any row (empty or NaN); record the take again")
+    single, whole = np.count_nonzero(missing[~lost]), np.count_nonzero(lost)
+    return values, [
+        *([f"{whole} of {len(lost)} rows hold no values, as where the face was lost: they are gaps"] if whole else []),
+        *([f"{single} cells hold no number: they are gaps"] if single else []),
+    ]
 
 
 def _in_radians(values: Floats, are_angles: list[bool]) -> tuple[Floats, list[str]]:
     """Values whose angles are radians, and what was done."""
-    largest = float(np.abs(values[:, are_angles]).max(initial=0.0))
+    largest = float(np.nanmax(np.abs(values[:, are_angles]), initial=0.0))
     if largest <= LARGEST_ANGLE_RAD:
         return values, []
     said = f"angles of head and eyes go up to {largest:.3g}: they were taken as degrees"
@@ -179,6 +196,8 @@ def _table(path: Path) -> tuple[list[str], list[list[str]], list[str]]:
     if not rows:
         raise FacesynthError(f"{path} holds a header and no frames; record the take again")
     for number, row in enumerate(rows, start=2):
+        if row[1:2] == ["0"] and not any(row[2:]):  # a face that was lost: the time code and a count of 0
+            row.extend([""] * (len(header) - len(row)))
         if len(row) != len(header):
             raise FacesynthError(f"{path} row {number} has {len(row)} values; wanted {len(header)}; was the take cut off?")
     return header, rows, [f"the text was taken for {encoding}"] if encoding else []
@@ -217,8 +236,8 @@ def _spelled(name: str) -> str:
 
 
 def _number(cell: str) -> float:
-    """A number with a decimal point or comma; per cent are shares."""
-    plain = cell.replace(",", ".")
+    """A number with a decimal point or comma, NaN for none; per cent are shares."""
+    plain = cell.replace(",", ".") or "nan"
     return float(plain[:-1]) / 100 if plain.endswith("%") else float(plain)
 
 
@@ -227,23 +246,23 @@ def _numbers(path: Path, rows: list[list[str]], columns: list[int]) -> Floats:
         values = np.array([[_number(row[k]) for k in columns] for row in rows], np.float64).reshape(len(rows), len(columns))
     except ValueError as error:
         raise FacesynthError(f"{path} holds a value that is no number ({error})") from None
-    if not np.isfinite(values).all():
-        raise FacesynthError(f"{path} holds NaN or infinite values; remove those rows")
+    if np.isinf(values).any():
+        raise FacesynthError(f"{path} holds infinite values; remove those rows")
     return values
 
 
 def as_shares(path: Path, values: Floats, are_weights: list[bool]) -> tuple[Floats, list[str]]:
     """Values whose weights are shares of 1, and what was done."""
     weights = values[:, are_weights]
-    highest = float(weights.max(initial=0.0))
-    if highest > LARGEST_PER_CENT or weights.min(initial=0.0) < -LARGEST_PER_CENT:
-        raise FacesynthError(f"{path} holds weights up to {max(highest, -weights.min()):g}; wanted 0 to 1, or per cent")
+    highest = float(np.nanmax(weights, initial=0.0))
+    lowest = float(np.nanmin(weights, initial=0.0))
+    if highest > LARGEST_PER_CENT or lowest < -LARGEST_PER_CENT:
+        raise FacesynthError(f"{path} holds weights up to {max(highest, -lowest):g}; wanted 0 to 1, or per cent")
     said = f"weights go up to {highest:g}"
     over = float((weights > CLIPPED).mean()) if weights.size else 0.0
     if highest > PER_CENT:
         doubt = ", which is doubtful: if they are exaggerated shares, clip them at 1" if highest < DOUBTFUL else ""
         return np.where(are_weights, values / 100, values), [f"{said}: they were taken as per cent and divided by 100{doubt}"]
-    lowest = float(weights.min(initial=0.0))
     under = [f"weights go down to {lowest:g}: those under 0 are taken as 0"] if lowest < 1 - CLIPPED else []
     doubt = f", which is doubtful for {over:.0%} of all: if they are per cent of a quiet face, divide by 100"
     return values, [

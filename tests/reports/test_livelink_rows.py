@@ -42,6 +42,31 @@ def test_lost_rows_of_a_clock_that_runs_ahead_and_falls_back(tmp_path):
     assert reading.remarks == ("15 of 180 frames have no row by the time codes: they are gaps",)
 
 
+LOST_FACES = {
+    "count of 0 alone": lambda row: row.split(",")[0] + ",0",
+    "empty cells": lambda row: row.split(",")[0] + ",0" + "," * 61,
+    "zeros": lambda row: row.split(",")[0] + ",0" + ",0.0" * 61,
+    "NaN": lambda row: row.split(",")[0] + ",61" + ",nan" * 61,
+}
+
+
+@pytest.mark.parametrize("kind", LOST_FACES)
+def test_rows_of_a_face_that_was_lost_are_gaps(tmp_path, kind):
+    path = write(tmp_path / "a.csv", timecodes_of(COUNT), values_of(COUNT))
+    lost = [0, 1, *range(50, 70)]
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    text = "\n".join([header, *(LOST_FACES[kind](row) if k in lost else row for k, row in enumerate(rows))])
+    path.write_text(text, encoding="utf-8")
+    reading = read(path)
+    kept = np.setdiff1d(np.arange(COUNT), lost)
+    np.testing.assert_allclose(jaw(reading.motion)[kept], kept / COUNT, atol=1e-6)
+    for part in (reading.motion.frames, reading.motion.head, reading.motion.eyes):
+        assert np.array_equal(np.flatnonzero(np.isnan(part).all(axis=1)), lost)
+    assert reading.remarks == ("22 of 180 rows hold no values, as where the face was lost: they are gaps",)
+    with pytest.raises(FacesynthError, match="rows without values"):
+        read_livelink(path)
+
+
 @pytest.mark.parametrize("doubled", [[10, 11, 90], list(range(COUNT))])
 def test_rows_that_are_there_twice_are_read_once(tmp_path, doubled):
     codes, values = timecodes_of(COUNT), values_of(COUNT)

@@ -38,7 +38,7 @@ def _head(take: Take) -> Floats | None:
     if not take.has(HEAD_ANGLES):
         return None
     turn = Rotation.from_euler("YXZ", take.rows(HEAD_ANGLES) * [-1, 1, -1]).as_rotvec()
-    return np.concatenate([turn, np.zeros_like(turn)], axis=1)
+    return np.concatenate([turn, np.where(np.isnan(turn), turn, 0.0)], axis=1)
 
 
 def _eyes(take: Take) -> Floats | None:
@@ -55,4 +55,5 @@ def _lacking(take: Take) -> tuple[str, ...]:
     lacks = [what for what, angles in (("head", HEAD_ANGLES), ("eyes", EYE_ANGLES)) if not take.has(angles)]
     if lacks:
         return (f"the take has no angles of {' and '.join(lacks)}",)
-    return () if np.any(take.rows(HEAD_ANGLES)) else ("the head angles are all zero: the app was told not to stream them",)
+    turned = np.nan_to_num(take.rows(HEAD_ANGLES)).any()
+    return () if turned else ("the head angles are all zero: the app was told not to stream them",)

@@ -97,6 +97,8 @@ def read_livelink(path: str | Path, fps: float | None = None) -> LiveLinkTake:
     if not take.has(wanted):
         lacking = next(name for name in wanted if name not in take.names)
         raise FacesynthError(f"{path} has no column {lacking!r}; wanted the {COUNT} of the app")
+    if np.isnan(take.values).any():
+        raise FacesynthError(f"{path} holds rows without values (NaN); add it to a corpus, where they are gaps")
     return LiveLinkTake(take.timecodes, take.rows(wanted), take.fps)
 
 
