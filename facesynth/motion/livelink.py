@@ -145,7 +145,7 @@ def _without_lost_faces(path: Path, values: Floats, counts: list[str]) -> tuple[
         raise FacesynthError(f"{path} holds no values in any row (empty or NaN); record the take again")
     single, whole = np.count_nonzero(missing[~lost]), np.count_nonzero(lost)
     return values, [
-        *([f"{whole} of {len(lost)} rows hold no values, as where the face was lost: they are gaps"] if whole else []),
+        *([f"{whole} of {len(values)} rows hold no values, as where the face was lost: they are gaps"] if whole else []),
         *([f"{single} cells hold no number: they are gaps"] if single else []),
     ]
 
