@@ -141,7 +141,12 @@ def _rules() -> tuple[Rule, ...]:
         (r"(?<![\d/])(0?[1-9]|1[0-2])/((?:19|20)\d\d)\b(?!/)", lambda m: f"{_MONTHS[int(m[1]) - 1]} {_year(m[2])}"),
         (r"\b(\d{1,2})/(\d{1,2})/(\d{4}|\d\d)\b", lambda m: _slashed(m[1], m[2], m[3])),
         (r"\b(\d{1,2})\.(\d{1,2})\.(\d{4})\b", lambda m: _date(m[1], m[2], m[3])),
+        (
+            rf"\b({_MONTH})\s+(\d{{1,2}})\s?[-–]\s?(\d{{1,2}})\b(?![:.]\d|\s?[ap]\.?m)",
+            lambda m: f"{_named(m[1], m[2], None)} to {ordinal(m[3])}",
+        ),
         (rf"\b({_MONTH})\s+(\d{{1,2}})(?:st|nd|rd|th)?(?:,?\s+{year})?\b(?![:.]\d)", lambda m: _named(m[1], m[2], m[3])),
+        (rf"\b(?:the\s+)?(\d{{1,2}})\s?[-–]\s?(?=\d{{1,2}}\s+(?:of\s+)?(?:{_MONTH})\b)", lambda m: f"the {ordinal(m[1])} to"),
         (
             rf"\b(?:the\s+)?(\d{{1,2}})(?:st|nd|rd|th)?\s+(?:of\s+)?({_MONTH})(?:,?\s+{year})?(?![\w:])",
             lambda m: _named(m[2], m[1], m[3], day_first=True),

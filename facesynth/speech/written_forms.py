@@ -70,7 +70,7 @@ _FORMS: tuple[tuple[str, Replacement], ...] = (
     (r"(?<=[\d½¼¾⅛⅜⅝⅞])(?<!'\d)(?<!'\d\d)\s?(?:″|'')", " inches"),
     (r"(?<![\w'])(\d{1,3})'(?=\s|[.,;)]|x|$)", r"\1 ft"),
     (r"(?<=inches|....ft)\s?[x×]\s?(?=\d)", " by "),
-    (r"(?<=\d)(\s?)in\.(?=[\s,;)]|$)", r"\1inches"),
+    (r"(?<=\d)(\s?)in\.(?=[\s,;)]|$)|(?<=\d)in\b|((?:ft|foot|feet)\.?\s?\d{1,2}\s)in\b", r"\1\2inches"),
     (r"(?<=\d)(\s?)m\.p\.h\b\.?", r"\1mph"),
     (r"(?<![\d/])(?<!\d\s)\bkm/h\b", "kilometers per hour"),
     (r"\b(sq|cu)\.\s?(?=ft|in|mi|yd|k?m\b)", r"\1 "),

@@ -68,8 +68,8 @@ def test_avatars_by_their_first_bytes(tmp_path, said):
         channels, told = said(path)
         assert channels[opening][OPENING].max() > 0.5
         assert any(f"follow the preset {chosen}" in line for line in told)
-    odd = head(tmp_path / "binary.gltf")
-    assert load_own_head(odd).names == TALKING
+    for odd in ("binary.gltf", "downloaded.bin", "no_suffix"):
+        assert load_own_head(head(tmp_path / odd)).names == TALKING
 
 
 @pytest.mark.parametrize(("kind", "chosen"), [(vrm0_mixing, "vrm0"), (vrm1_mixing, "vrm1")])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from facesynth.face.animation import FaceAnimation
+from facesynth.face.files.gltf.document import is_binary
 from facesynth.face.files.gltf.scene import Part, Scene, read_scene
 from facesynth.face.rig.channel_map import ChannelMap, arkit_name
 from facesynth.face.rig.mapping_file import HeadMapping
@@ -126,7 +127,7 @@ def load_own_head(path: str | Path, mapping: str | Path | None = None, *, needs_
     found = Path(mapping) if mapping is not None else beside if beside.is_file() else None
     if path.is_dir():
         return _from_obj(path, found, needs_arkit)
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES and not (path.is_file() and is_binary(path)):
         raise FacesynthError(f"{path} is no head: wanted .glb, .gltf, .vrm, or a folder of OBJ files")
     return _from_scene(path, read_scene(path, TEXELS), found, needs_arkit)
 
