@@ -72,6 +72,8 @@ _DIGRAPHS = frozenset(["ch", "sh", "zh"])
 """One sound in every spelling that writes them: of ARPAbet, and of pinyin; no two letters of IPA."""
 _SYLLABIC = {"l": "el", "ɫ": "el", "m": "em", "n": "en", "ŋ": "en", "r": "er", "ɹ": "er", "ɻ": "er"}
 _MOST_NAMED = 4
+_LONGEST_SHOWN, _LONGEST_LABEL = 40, 64
+"""Letters; what is longer is a sentence, or damaged, and no phone."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def normalise_phone(label: str, notation: Notation = "arpabet") -> str:
     """
     found = _read(label, notation)
     if found is None:
-        raise unknown("phone", label, PHONES)
+        raise unknown("phone", label if len(label) <= _LONGEST_SHOWN else f"{label[:_LONGEST_SHOWN]}…", PHONES)
     return found
 
 
@@ -165,6 +167,8 @@ def _read(label: str, notation: Notation) -> str | None:
     name = re.sub(r"(?<=\w)_[BIES]$", "", unicodedata.normalize("NFC", label).strip())
     if _is_mark(name.lower()):
         return SILENCE
+    if len(name) > _LONGEST_LABEL:
+        return None
     if notation in SETS and (phone := in_set(name, notation)):
         return phone
     if name.lower().rstrip("0123456789") in _DIGRAPHS:
@@ -178,7 +182,12 @@ def _read(label: str, notation: Notation) -> str | None:
 def _approximated(label: str, notation: Notation) -> str | None:
     """The phone that stands for a label with a sound that English lacks; None for any other."""
     name = unicodedata.normalize("NFC", label).strip()
-    if _is_mark(name.lower()) or (notation == "arpabet" and _by_name(name)) or (notation in SETS and in_set(name, notation)):
+    if (
+        len(name) > _LONGEST_LABEL
+        or _is_mark(name.lower())
+        or (notation == "arpabet" and _by_name(name))
+        or (notation in SETS and in_set(name, notation))
+    ):
         return None
     text = _ipa_of(name) if notation == "x_sampa" else name
     sounds = _sounds_in(text) if text else None

@@ -11,6 +11,8 @@ from facesynth.speech.segments import Segment
 MOST_UNKNOWN = 0.5
 """Where a larger share of the different labels means nothing, they are no phones."""
 MOST_NAMED = 4
+LONGEST_LABEL = 24
+"""Letters; what is longer is a sentence, or damaged, and no part of it is looked at."""
 
 
 def with_stand_ins(segments: Sequence[Segment], notation: Notation) -> tuple[list[Segment], tuple[str, ...]]:
@@ -40,7 +42,8 @@ def _phone(label: str, notation: Notation) -> str | None:
 def _stand_in(label: str, notation: Notation) -> str:
     """A label that means something here; empty, which is silence, where nothing is like it."""
     letters = "".join(letter for letter in label if letter.isalpha())
-    tails = (letters[k:] for k in range(len(letters))) if len(letters) >= 0.5 * len(label.strip()) else ()
+    readable = 0.5 * len(label.strip()) <= len(letters) <= LONGEST_LABEL
+    tails = (letters[k:] for k in range(len(letters))) if readable else ()
     return next((tail for tail in tails if _phone(tail, notation) not in (None, SILENCE)), "")
 
 

@@ -1,5 +1,7 @@
 """TextGrids that Praat reads and others refuse: overlaps of rounding, intervals of no length, encodings, all of its forms."""
 
+import time
+
 import numpy as np
 import pytest
 from bringing import added, corpus_of, lay_down, run, spoken
@@ -166,3 +168,14 @@ def test_lines_of_labels_are_read_as_leniently(tmp_path, talker, kind):
     _, facts = spoken(talker, sound, tmp_path, "--phones", path)
     assert any("of no length" in line for line in facts["remarks"]) == ("no length" in kind)
     assert any("overlap" in line for line in facts["remarks"]) == ("overlaps" in kind)
+
+
+def test_a_label_of_a_hundred_thousand_letters_is_no_phone_and_no_hang(tmp_path):
+    path = put(tmp_path / "a.TextGrid", long_grid([("phones", [("B", 0.0, 0.4), ("P" * 100_000, 0.4, 0.6), ("AA1", 0.6, 1.0)])]))
+    started_s = time.process_time()
+    found = read_labelled(path, 1.0)
+    assert time.process_time() - started_s < 2
+    assert found.phones.labels == ("b", "pau", "aa")
+    (remark,) = [remark for remark in found.remarks if "no phones known here" in remark]
+    assert "as a rest of the lips" in remark
+    assert len(remark) < 200
