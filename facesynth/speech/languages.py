@@ -33,6 +33,8 @@ _SURE = 15.0
 of lines of five words in eight other languages the least was 30."""
 _SURER = 2 * _SURE
 """The same, where every word is an English one, too (`papa mama` looks like Quechua), or nobody here could pronounce it."""
+_FEWEST_WORDS = 4
+"""Fewer are not refused for looking like a language that nobody here could pronounce (`hakuna matata`)."""
 _MANY = ("ar", "de", "es", "fr", "hi", "it", "ja", "ko", "pt", "ru", "tr", "zh")
 _BLOBS = "g2p2_group_"
 """Begins the names of the packages that hold the words of a family of languages."""
@@ -188,5 +190,8 @@ def _by_trigrams(text: str, otherwise: str) -> str:
     logarithms = dict(py3langid.rank(" ".join(words)))
     best = max(logarithms, key=logarithms.__getitem__)
     is_english = otherwise == ENGLISH and all(map(is_known, words))
-    needed = _SURER if is_english or best not in covered_languages() else _SURE
+    is_covered = best in covered_languages()
+    if len(words) < _FEWEST_WORDS and not is_covered:
+        return otherwise
+    needed = _SURER if is_english or not is_covered else _SURE
     return str(best) if logarithms[best] > logarithms[otherwise] + needed else otherwise

@@ -47,6 +47,7 @@ def test_rounded_front_vowels_are_rounded():
         ("Ma, ma, ma! Pa, pa, pa!", "en"),
         ("La la la.", "en"),
         ("aba ebe ibi", "en"),
+        ("Hakuna matata", "en"),
         ("Le petit garçon mange une pomme.", "fr"),
         ("Die Katze schläft heute im Garten.", "de"),
         ("Маленький мальчик играет с мячом.", "ru"),
