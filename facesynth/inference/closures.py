@@ -22,6 +22,10 @@ SHUT_SHARE = 0.25
 """Lips count as shut up to this share of the way from the narrowest gap to a wide one …"""
 OPEN_SHARE = 0.6
 """… and as open from this share on; between them `keep_shut` holds them together less and less."""
+REST_S = 0.3
+"""Lips that are shut for longer than this rest: no p, b or m takes so long …"""
+HELD_S = 0.12
+"""… but one may begin or end a rest: so long before and after it lips are held shut all the same."""
 CLOSING_S = 0.04
 """In `close_at`, lips take at least this long to close and to open, seconds."""
 LONGEST_CLOSING_S = 0.15
@@ -52,17 +56,21 @@ def close_lips(frames: Floats, wanted: Floats, layout: Layout, bounds: NDArray[n
     return parts.whole()
 
 
-def keep_shut(changed: Floats, before: Floats, layout: Layout) -> Floats:
+def keep_shut(changed: Floats, before: Floats, layout: Layout, fps: float) -> Floats:
     """Frames [T, C] like `changed`, with the inner lips as near to each other as they were where they were shut `before`.
 
     Each pair of facing lip points gets back the distance vector that it had, half from above and half from below;
-    the other points of a lip follow by the mean of its corrections. Layouts without lip pairs stay as they are.
+    the other points of a lip follow by the mean of its corrections. A face that was changed to rest with its lips apart, as
+    one that bares its teeth, does so in pauses. Layouts without lip pairs stay as they are.
     """
     if not has_lips(layout):
         return changed
     upper, lower = np.array(layout.lip_pairs).T
     points, old = layout.points(changed.copy()), layout.points(before)
-    shut = _shut(pair_gaps(before, layout))[..., None]
+    gaps = pair_gaps(before, layout)
+    shut = _shut(gaps, gaps)
+    resting = _resting_apart(shut.mean(axis=1), _shut(pair_gaps(changed, layout), gaps).mean(axis=1), fps)
+    shut = (shut * (1 - resting[:, None]))[..., None]
     apart = (points[:, upper] - points[:, lower]) - (old[:, upper] - old[:, lower])
     bring_together(points, layout, shut * apart / 2)
     return points.reshape(changed.shape)
@@ -172,8 +180,21 @@ def bring_together(points: Floats, layout: Layout, correction: Floats) -> None:
         points[:, own] += sign * correction
 
 
-def _shut(gaps: Floats) -> Floats:
-    """[T, pairs] 1 where the lips are shut, 0 where they are open."""
-    narrow, wide = np.nanpercentile(gaps, [1, 95], axis=0)
+def _shut(gaps: Floats, scale: Floats) -> Floats:
+    """[T, pairs] 1 where the lips are shut, 0 where they are open, between the narrowest and wide ones of `scale` [T', pairs]."""
+    narrow, wide = np.nanpercentile(scale, [1, 95], axis=0)
     share = (gaps - narrow) / np.maximum(wide - narrow, 1e-6)
     return np.clip((OPEN_SHARE - share) / (OPEN_SHARE - SHUT_SHARE), 0.0, 1.0)
+
+
+def _resting_apart(shut: Floats, changed: Floats, fps: float) -> Floats:
+    """[T] 1 within rests of lips, shut [T], that are open in most of their frames once they are changed, changed [T]; else 0."""
+    resting = np.zeros(len(shut))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], shut > 0.5, [0]])))
+    for start, stop in edges.reshape(-1, 2):
+        if stop - start > REST_S * fps and np.median(changed[start:stop]) < 0.5:
+            here = np.arange(start, stop)
+            since = here - start if start > 0 else np.inf
+            until = stop - 1 - here if stop < len(shut) else np.inf
+            resting[start:stop] = np.clip(np.minimum(since, until) / (HELD_S * fps) - 1, 0, 1)
+    return resting

@@ -101,7 +101,7 @@ class Expression:
         changed = frames + added
         if motion.layout.kind == "curves":
             changed = np.where(added == 0, frames, np.clip(changed, 0, 1))
-        return replace(motion, frames=keep_shut(changed, frames, motion.layout).astype(np.float32))
+        return replace(motion, frames=keep_shut(changed, frames, motion.layout, motion.fps).astype(np.float32))
 
     def synthesize(self, speech: Speech, *, seed: int = 0, **options: Any) -> Motion:
         """A face that feels and says nothing."""

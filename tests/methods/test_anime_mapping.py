@@ -140,10 +140,26 @@ def test_lips_that_were_shut_are_brought_together_and_open_ones_are_left():
     before[20:, 3 * lower + 1] -= 12
     changed = before.copy()
     changed[:, 3 * lower + 1] -= 2
-    kept = keep_shut(changed, before, layout)
+    kept = keep_shut(changed, before, layout, fps=60)
     gaps = [f[:, 3 * upper + 1] - f[:, 3 * lower + 1] for f in (before, changed, kept)]
     np.testing.assert_allclose(gaps[2][:20], gaps[0][:20])
     np.testing.assert_allclose(kept[20:], changed[20:])
+
+
+def test_lips_rest_apart_where_an_emotion_has_them_apart_but_closures_stay():
+    layout, fps = tiny_layout(), 60
+    lower = layout.lip_pairs[0][1]
+    openings = np.repeat([0, 12, 0, 12, 0], [60, 30, 6, 30, 60])  # a rest, a vowel, a p, a vowel, a rest
+    before = np.tile(np.array(layout.neutral), (len(openings), 1))
+    before[:, 3 * lower + 1] -= openings
+    opened, shifted = before.copy(), before.copy()
+    opened[:, 3 * lower + 1] -= 9
+    shifted[:, 3 * lower + 1] -= 1
+    widening = [(keep_shut(frames, before, layout, fps) - before)[:, 3 * lower + 1] for frames in (opened, shifted)]
+    assert np.abs(widening[0][[10, 177]] + 9).max() < 1e-9  # teeth bared in pauses
+    assert np.abs(widening[0][92:94] + 9 / 2).max() < 1e-9  # both lips are where half of it is, together
+    assert np.abs(widening[0][[56, 128]] + 9 / 2).max() < 1e-9  # so near to a vowel it may be a p
+    assert np.abs(widening[1][[10, 93, 177]] + 1 / 2).max() < 1e-9  # lips that are hardly apart are shut
 
 
 def test_an_emotion_of_lower_intensity_is_nearer_to_neutral(model, corpus):

@@ -36,7 +36,7 @@ def takes_of(made, lift, seed=0):
                 felt = lift * (emotion == "happy") + 0.3 * rng.normal(size=2)
                 u = np.hstack([words, np.tile(felt, (60, 1))]) + 0.1 * rng.normal(size=(60, 4))
                 frames = plain.decode_array(u).astype(np.float32)
-                takes.append(Take(f"s{sentence}", emotion, take, frames, made.encode_array(frames)))
+                takes.append(Take(f"s{sentence}", emotion, take, frames, made.encode_array(frames), 60))
     return takes
 
 

@@ -47,7 +47,7 @@ class EmotionMapper:
         change = (self.maps.through(before, number) - before) @ self.mixing.T
         amount = np.broadcast_to(np.asarray(intensity, np.float64), len(frames))[:, None]
         changed = frames + amount * (change + self.dropped[number])
-        return replace(motion, frames=keep_shut(changed, frames, motion.layout).astype(np.float32))
+        return replace(motion, frames=keep_shut(changed, frames, motion.layout, motion.fps).astype(np.float32))
 
     def map_along(self, motion: Motion, speech: Speech, target: str, *, intensity: float = 1.0) -> Motion:
         """Any motion of the learned layout that goes with speech, from the speech's emotions to another one."""

@@ -26,15 +26,16 @@ class Take:
     """[T, C] its complete frames."""
     components: Floats
     """[T, D]"""
+    fps: float
 
 
 def take_of(utterance: Utterance, components: FaceComponents) -> Take | None:
     """The utterance's complete frames, or None where there are hardly any."""
-    frames = utterance.motion.frames
+    frames, fps = utterance.motion.frames, utterance.motion.fps
     frames = frames[np.isfinite(frames).all(axis=1)]
     if len(frames) < LEAST_FRAMES:
         return None
-    return Take(utterance.sentence, utterance.emotion, utterance.take, frames, components.encode_array(frames))
+    return Take(utterance.sentence, utterance.emotion, utterance.take, frames, components.encode_array(frames), fps)
 
 
 def emotion_pairs(takes: Iterable[Take], source: str, target: str) -> list[tuple[Take, Take]]:

@@ -204,7 +204,7 @@ class MapTrial:
         emotional = learned.split.emotional
         change[:, emotional] += fitted.rbf(torch.from_numpy(take.components[:, emotional])).numpy()
         moved = take.frames + change @ learned.components.mixing.numpy().T + fitted.dropped
-        return keep_shut(moved, take.frames.astype(np.float64), self.layout)
+        return keep_shut(moved, take.frames.astype(np.float64), self.layout, take.fps)
 
 
 def _truth(learned: Learned, a: Take, b: Take) -> Floats:
