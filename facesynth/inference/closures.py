@@ -18,7 +18,7 @@ FADED = 9
 """Standard deviations beyond which a bump is nothing: under 1e-17 of its height."""
 FADING_S = 0.03
 """Standard deviation of the bump that `close_lips` narrows the mouth by, seconds."""
-SHUT_SHARE = 0.05
+SHUT_SHARE = 0.15
 """Lips count as shut up to this share of the way from the narrowest gap to a wide one …"""
 OPEN_SHARE = 0.25
 """… and as open from this share on; between them `keep_shut` holds them together less and less."""
@@ -188,7 +188,7 @@ def _shut(gaps: Floats, scale: Floats) -> Floats:
 
 
 def _resting_apart(shut: Floats, changed: Floats, fps: float) -> Floats:
-    """[T] 1 within rests of lips, shut [T], that are wholly open in most of their frames once they are changed, changed [T]; else 0."""
+    """[T] 1 within rests of lips, shut [T], most of whose frames are wholly open once they are changed, changed [T]; else 0."""
     resting = np.zeros(len(shut))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], shut > 0.5, [0]])))
     for start, stop in edges.reshape(-1, 2):

@@ -36,7 +36,7 @@ class MapScore:
     """Sentences recorded in both emotions; each was left out once, or with others of its fold."""
     unchanged: float
     mean_difference: float
-    """The mean difference of the two emotions added to every frame."""
+    """The mean difference of the two emotions added to every frame, lips kept shut as by a map."""
     mapped: dict[str, float]
     """By kernel and width."""
 
@@ -189,7 +189,8 @@ class MapTrial:
     ) -> dict[str, float]:
         a, b = pair
         truth = _truth(learned, a, b)
-        plain = {"unchanged": a.frames.astype(np.float64), "mean difference": a.frames + mean}
+        frames = a.frames.astype(np.float64)
+        plain = {"unchanged": frames, "mean difference": keep_shut(frames + mean, frames, self.layout, a.fps)}
         errors = {name: unit_cube_rms(guess, truth, self.layout) for name, guess in plain.items()}
         return errors | {name: self._error(learned, pair, fitted) for name, fitted in maps.items()}
 
