@@ -124,16 +124,8 @@ def _attributes() -> str:
     return rf"(?i)(\ban?\s+(?:(?:{numbers}|hundred|point)[\s-]+)+)({'|'.join(_SINGULAR)})\s+(?!to\b)(?=[a-z])"
 
 
-@cache
-def _rules() -> tuple[Rule, ...]:
-    """In order: what is more special comes first, plain numbers last."""
-    symbols = "".join(re.escape(sign) for sign in _MONEY if not sign.isalpha())
-    codes = "|".join(code for code in _MONEY if code.isalpha())
-    units = "|".join(re.escape(unit) for unit in sorted(_UNITS, key=len, reverse=True))
-    spatial = "|".join(unit for unit in _UNITS if unit[-1] in "²³")
-    scale = _SCALE.replace("(", "(?:")
-    money = rf"[{symbols}]\s?(?:{_N})(?:{scale})?|(?:{_N})(?:{scale})?\s?(?:[{symbols}]|(?:{codes})\b)"
-    year = r"(1\d{3}|2\d{3})"
+def _moments(year: str) -> tuple[Rule, ...]:
+    """Dates and times of day; `year` matches one."""
     return (
         (r"\b(\d{4})-(\d\d)-(\d\d)\b", lambda m: _date(m[3], m[2], m[1])),
         (r"\b(\d{4})/(\d{1,2})/(\d{1,2})\b", lambda m: _date(m[3], m[2], m[1])),
@@ -153,6 +145,21 @@ def _rules() -> tuple[Rule, ...]:
         ),
         (r"\b(\d{1,2}):(\d\d)(?::(\d\d))?(?:\s?([ap])\.?m\b\.?)?", lambda m: _time(m[1], m[2], m[3], m[4])),
         (r"\b(\d{1,2})\s?([ap])\.?m\b\.?", lambda m: f"{cardinal(m[1])} {m[2].lower()} m"),
+    )  # fmt: skip
+
+
+@cache
+def _rules() -> tuple[Rule, ...]:
+    """In order: what is more special comes first, plain numbers last."""
+    symbols = "".join(re.escape(sign) for sign in _MONEY if not sign.isalpha())
+    codes = "|".join(code for code in _MONEY if code.isalpha())
+    units = "|".join(re.escape(unit) for unit in sorted(_UNITS, key=len, reverse=True))
+    spatial = "|".join(unit for unit in _UNITS if unit[-1] in "²³")
+    scale = _SCALE.replace("(", "(?:")
+    money = rf"[{symbols}]\s?(?:{_N})(?:{scale})?|(?:{_N})(?:{scale})?\s?(?:[{symbols}]|(?:{codes})\b)"
+    year = r"(1\d{3}|2\d{3})"
+    return (
+        *_moments(year),
         (r"\b(\d+):(\d+)\b", lambda m: f"{cardinal(m[1])} to {cardinal(m[2])}"),
         (
             rf"((?:{money})|(?:{_N})\s?(?:{units}))\s?/\s?({units}|[a-z]+)\b",

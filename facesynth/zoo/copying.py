@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from facesynth.inference.errors import FacesynthError
-from facesynth.inference.folder import MANIFEST, open_folder
+from facesynth.inference.folder import CARD, MANIFEST, open_folder
 from facesynth.zoo.shelf import names
 
 
@@ -31,9 +31,12 @@ def copy_packaged(model: Path, output: Path, *, changed: bool) -> dict[str, Any]
     contents = open_folder(folder).contents
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent) as beside:
-        part = Path(shutil.copytree(folder, Path(beside) / output.name))
+        part = Path(beside) / output.name
+        part.mkdir()
         for name, content in contents.items():  # some of them lie beside the folder, for several models
             (part / name).write_bytes(content)
+        for name in (MANIFEST, CARD):
+            shutil.copyfile(folder / name, part / name)
         if output.exists():
             output.rmdir()
         part.rename(output)
