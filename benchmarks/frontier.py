@@ -6,7 +6,9 @@ Each of five folds tests a fifth of the sentences. Of the others a fifth says ho
 (and which variant of `network_variants.py` is taken, of those that FOLDER holds for the fold), by models that learned from the
 rest; those that are tested learned from all of them. FOLDER keeps networks and figures; `--join` prints the table over all folds
 that are there, every clip tested once. Rows stand there as they come, and with lips closed at p, b and m by the same step for
-all. Differences are tested clip by clip (Wilcoxon, Holm). `--clips`: learn from so many clips only, the first rows alone.
+all. Differences are tested clip by clip (Wilcoxon, Holm). `--clips`: learn from so many clips only, the first rows alone; of the
+clips that this leaves over as many as else choose, by the models that are tested. With several such numbers `--join` prints the
+curve as well. OMP_NUM_THREADS says how many threads learn.
 """
 
 import argparse
@@ -18,9 +20,8 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-import torch
 from frontier_table import Judge, Motions, join
-from network_variants import VARIANTS, inner, kept, parts
+from network_variants import VARIANTS, fewer, inner, kept, parts
 
 from facesynth.config import load_config
 from facesynth.corpus import Corpus, Utterance
@@ -54,7 +55,6 @@ def main() -> None:
     parser.add_argument("--device", default="cpu", help="where networks learn")
     parser.add_argument("--join", action="store_true", help="only print the tables of what is there")
     options = parser.parse_args()
-    torch.set_num_threads(2)
     for fold in [] if options.join else [options.fold] if options.fold else range(1, 6):
         one_fold(Corpus.open(options.corpus), fold, options)
     if options.join or options.fold is None:
@@ -65,10 +65,11 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
     """Figures of every row for the tested clips of a fold, kept in the folder."""
     began = perf_counter()
     rest, tested = parts(corpus, fold)
-    if options.clips:
-        order = np.random.default_rng(fold).permutation(len(rest.ids))
-        rest = rest.subset([rest.ids[i] for i in order[: options.clips]])
     learned, held_out = inner(rest, fold)
+    if options.clips:  # those that are left over choose, and the models that are tested need no others beside them
+        count = len(held_out)
+        rest, spare = fewer(rest, fold, options.clips)
+        learned, held_out = (rest, fewer(spare, fold, count)[0]) if len(spare) >= count else inner(rest, fold)
     variant = options.variant or best_variant(options.output, fold)
     stem = f"{fold}_{variant.replace(' ', '_')}" + (f"_{len(rest)}clips" if options.clips else "")
     print(f"fold {fold}, {len(rest)} clips, {variant}", flush=True)
@@ -93,10 +94,11 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
         last = name if options.plain else f"{name}, lips sharpened, residual"
         if last in judge.rows or name not in (options.rows or makers):
             continue
-        plain = spoken(make(whole, rest), tested)
+        model = make(whole, rest)
+        plain = spoken(model, tested)
         found = {name: plain}
         if not options.plain:
-            shares = shares_of(make(network(learned, "0"), learned), held_out)
+            shares = shares_of(model if learned is rest else make(network(learned, "0"), learned), held_out)
             found[f"{name}, sharpened"] = lively(plain, tested, shares[1])
             found[last] = lively(plain, tested, shares[0], beside_lips(rest))
             print(f"{fold}: {name}: sharpened by {shares}")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from frontier_curve import curve_lines
 from scipy.stats import wilcoxon
 
 from facesynth.corpus import Corpus, Utterance
@@ -19,6 +20,8 @@ from facesynth.inference.motion import Motion
 from facesynth.methods.learn.point_loss import lip_points
 
 Motions = dict[str, Motion]
+Folds = dict[int, dict[str, np.ndarray]]
+"""By fold the rows [clips, FIGURES]."""
 FIGURES = ("`lve`", "energy", "of the lips", "closure", "false", "closed: `lve`", "closure", "false", "in step", "told apart")
 BEST = "eFASE soft, lips sharpened, residual"
 
@@ -49,18 +52,41 @@ class Judge:
 
 
 def join(folder: Path) -> None:
-    """Tables over the folds that are there, one for each number of clips."""
-    by_count: dict[int, list[dict[str, np.ndarray]]] = {}
+    """Tables over the folds that are there, one for each number of clips, and how errors fall from one to the next."""
+    by_count: dict[int, Folds] = {}
     for path in sorted(folder.glob("figures_*_*.npz")):
-        by_count.setdefault(int(path.stem.split("_")[1]), []).append(dict(np.load(path)))
+        count, fold = map(int, path.stem.split("_")[1:])
+        by_count.setdefault(count, {})[fold] = dict(np.load(path))
     for count, folds in sorted(by_count.items()):
-        shared = [row for row in folds[0] if all(row in fold for fold in folds)]
-        rows = {row: np.concatenate([fold[row] for fold in folds]) for row in shared}
-        print(f"\n{count} clips to learn from, {len(folds)} folds, {len(rows[shared[0]])} clips tested\n")
+        rows = joined(folds)
+        print(f"\n{count} clips to learn from, {len(folds)} folds, {len(next(iter(rows.values())))} clips tested\n")
         print("| | " + " | ".join(FIGURES) + " |\n|---|" + "---:|" * len(FIGURES))
         for row, lines in rows.items():
             print(f"| {row} | {cells(lines)} |")
         compared(rows)
+    if len(by_count) > 1:
+        curve(by_count)
+
+
+def joined(folds: Folds) -> dict[str, np.ndarray]:
+    """Rows that all folds have, over all of them."""
+    first, *others = (folds[fold] for fold in sorted(folds))
+    shared = [row for row in first if all(row in other for other in others)]
+    return {row: np.concatenate([first[row], *(other[row] for other in others)]) for row in shared}
+
+
+def curve(by_count: dict[int, Folds]) -> None:
+    """The rows and folds that every number of clips has, beside each other."""
+    shared = sorted(set.intersection(*(set(folds) for folds in by_count.values())))
+    if not shared:
+        print("\nno fold has figures for every number of clips")
+        return
+    tables = {count: joined({fold: folds[fold] for fold in shared}) for count, folds in sorted(by_count.items())}
+    rows = [row for row in tables[min(tables)] if row != "recorded" and all(row in table for table in tables.values())]
+    errors, energies = ({row: {n: table[row][:, k] for n, table in tables.items()} for row in rows} for k in (0, 1))
+    means = {row: {n: float(each.mean()) for n, each in numbers.items()} for row, numbers in energies.items()}
+    print(f"\nlip error, mm (energy), by clips to learn from: folds {', '.join(map(str, shared))}\n")
+    print("\n".join(curve_lines(errors, means)))
 
 
 def compared(rows: dict[str, np.ndarray]) -> None:

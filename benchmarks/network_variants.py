@@ -4,6 +4,7 @@ python benchmarks/network_variants.py CORPUS -o FOLDER [--fold 1] [--device cuda
 
 Of the clips that a fold learns from a fifth is kept out; the rest is learned from, and the lip error of the clips kept out says
 which variant is best. The tested clips play no part. Each network stays in FOLDER, and is not learned again.
+OMP_NUM_THREADS says how many threads learn.
 """
 
 import argparse
@@ -14,15 +15,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from unittest.mock import patch
 
 import numpy as np
-import torch
 
 from facesynth.corpus import Corpus
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
+from facesynth.inference.errors import FacesynthError
 from facesynth.methods.learn import expectation, point_loss, windows
 from facesynth.methods.learn.hearing import Hearing
 from facesynth.methods.learn.pose_network import PoseNetwork
@@ -101,6 +102,14 @@ def parts(corpus: Corpus, fold: int) -> tuple[Corpus, Corpus]:
     return list(corpus.folds(FOLDS, 0))[fold - 1]
 
 
+def fewer(rest: Corpus, fold: int, count: int) -> tuple[Corpus, Corpus]:
+    """(so many clips to learn from, those that are left over) at random; a smaller number's are among a larger one's."""
+    if not 1 <= count <= len(rest):
+        raise FacesynthError(f"{count} clips are wanted to learn from; fold {fold} has 1 to {len(rest)}")
+    order = [rest.ids[i] for i in np.random.default_rng(fold).permutation(len(rest.ids))]
+    return rest.subset(order[:count]), rest.subset(order[count:])
+
+
 def inner(rest: Corpus, fold: int) -> tuple[Corpus, Corpus]:
     """(to learn from, to choose by) of what a fold learns from."""
     order = np.random.default_rng(4 + fold).permutation(len(rest.ids))
@@ -118,7 +127,9 @@ def kept(path: Path, corpus: Corpus, variant: Variant, seed: int, device: str) -
     """The network of a file, or a new one that is written there."""
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
+        began = process_time()
         trained(corpus, variant, seed, device).save(path)
+        print(f"{path.stem}: {len(corpus)} clips learned from in {process_time() - began:.0f} s of processor time", flush=True)
     found = load(path)
     assert isinstance(found, Network)
     return found
@@ -157,5 +168,4 @@ def changed(variant: Variant) -> Iterator[None]:
 
 
 if __name__ == "__main__":
-    torch.set_num_threads(2)
     main()
