@@ -63,13 +63,15 @@ VARIANTS = {
     "longer": BANDS | Variant({"steps": 1400}),
     "settled": SETTLED,
     "dropped, settled": DROPPED | SETTLED,
-    "sound": Variant({"phones": False}),
 }
 LOOK_AHEAD_MS = (0, 40, 80, 160, 320)
 VARIANTS |= {f"{ms} ms": Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
-BY_EAR = BANDS | Variant({"phones": False})
-VARIANTS |= {"sound, bands": BY_EAR}
-VARIANTS |= {f"sound {ms} ms": BY_EAR | Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
+FEATURES = ("log_mel", "phone_net", "both")
+BY_EAR = {features: Variant({"features": features, "phones": False}) for features in FEATURES}
+"""Networks that hear sound alone."""
+for heard, alone in BY_EAR.items():
+    VARIANTS |= {f"sound, {heard}": alone}
+    VARIANTS |= {f"sound, {heard} {ms} ms": alone | Variant({"look_ahead_s": ms / 1000}) for ms in LOOK_AHEAD_MS}
 
 
 def main() -> None:
@@ -88,13 +90,17 @@ def main() -> None:
     shorter = Variant({"steps": options.steps} if options.steps else {})
     for name in options.variants:
         began = perf_counter()
-        stem = f"{options.fold}_{name.replace(' ', '_')}" + (f"_{options.steps}steps" if options.steps else "")
-        path = options.output / f"{stem}_{options.seed}.safetensors"
+        path = options.output / file_of(name, options.fold, options.steps, options.seed)
         network = kept(path, learned, VARIANTS[name] | shorter, options.seed, options.device)
         lips, energy = judged(network, held_out)
         found = {"fold": options.fold, "variant": name, "steps": options.steps, "lve": lips, "energy": energy}
         path.with_suffix(".json").write_text(json.dumps(found))
         print(f"| {options.fold} | {name} | {lips:.3f} | {energy:.2f} | {perf_counter() - began:.0f} s |", flush=True)
+
+
+def file_of(variant: str, fold: int, steps: int | None, seed: int) -> str:
+    """What a network's file is called."""
+    return f"{fold}_{variant.replace(' ', '_')}" + (f"_{steps}steps" if steps else "") + f"_{seed}.safetensors"
 
 
 def parts(corpus: Corpus, fold: int) -> tuple[Corpus, Corpus]:

@@ -83,7 +83,7 @@ def streamed(speaker: Network, ahead_s: float) -> Speaker:
     """Sound in pieces of PIECE samples."""
 
     def speak(speech: Speech) -> Motion:
-        stream = speaker.stream(emotion="neutral", ahead_s=ahead_s)
+        stream = speaker.stream(ahead_s=ahead_s)
         sound = resample(speech.audio, speech.sample_rate, RATE)
         frames = [stream.push(sound[at : at + PIECE]) for at in range(0, len(sound), PIECE)]
         return Motion(np.concatenate([*frames, stream.finish()]), speaker.fps, speaker.layout)
