@@ -7,21 +7,35 @@ p, b and m, and how much nearer the network that waits longer is, clip by clip (
 """
 
 import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from frontier_curve import steps
 from frontier_table import figures
 from network_variants import BY_EAR, LOOK_AHEAD_MS, VARIANTS, Variant, file_of, inner, kept, parts
-from scipy.stats import wilcoxon
 from streams import streamed
 
 from facesynth.corpus import Corpus
 from facesynth.evaluation.lips import closure_threshold
-from facesynth.evaluation.paired import holm
+from facesynth.inference.arrays import Floats
 from facesynth.inference.network import AHEAD_S
 from facesynth.methods.network.method import Network
 
-COLUMNS = ("may hear ahead", "late, s", "lip error, mm", "energy", "closure", "nearer if it waits longer, mm", "clips", "p")
+COLUMNS = ("may hear ahead, ms", "late, s", "lip error, mm", "energy", "closure", "the next is nearer, mm", "in clips", "p")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What networks that look so far ahead are worth."""
+
+    late_s: float
+    """That a frame of the stream waits at most."""
+    errors: Floats
+    """[clips] mm of the lips."""
+    energy: float
+    closure: float
 
 
 def main() -> None:
@@ -37,36 +51,36 @@ def main() -> None:
     corpus = Corpus.open(options.corpus)
     learned, _ = inner(parts(corpus, options.fold)[0], options.fold)
     others = corpus.subset([name for name in corpus.ids if name not in set(learned.ids)])
-    print(f"{options.hears}: {len(learned.ids)} clips to learn from, {len(others.ids)} spoken", flush=True)
+    print(f"{options.hears}: {len(learned)} clips to learn from, {len(others)} spoken", flush=True)
     shorter = Variant({"steps": options.steps} if options.steps else {})
-    found: dict[str, tuple[float, np.ndarray]] = {}
-    for ahead in (*(f"{ms} ms" for ms in LOOK_AHEAD_MS), ""):
-        name = f"sound, {options.hears} {ahead}".rstrip()
+    rows: dict[int, Row] = {}
+    for ahead in (*(f" {ms} ms" for ms in LOOK_AHEAD_MS), ""):
+        name = f"sound, {options.hears}{ahead}"
         path = options.output / file_of(name, options.fold, options.steps, options.seed)
         network = kept(path, learned, VARIANTS[name] | shorter, options.seed, options.device)
-        found[ahead or "all"] = network.speaker().late_s(AHEAD_S), judged(network, others)
-    print_table(found)
+        expectation = network.speaker().expectation
+        rows[round(1000 * expectation.ahead / expectation.reading.rate)] = judged(network, others)
+    print("\n".join(table(rows)))
 
 
-def judged(network: Network, clips: Corpus) -> np.ndarray:
-    """[clips, 3] lip error (mm), energy and closures of what a stream gives."""
-    said, speak = list(clips), streamed(network.speaker(), AHEAD_S)
+def judged(network: Network, clips: Corpus) -> Row:
+    """What its stream gives of clips that it never heard."""
+    said, speaker = list(clips), network.speaker()
     threshold = closure_threshold((u.motion, u.speech.phones) for u in said)
+    speak = streamed(speaker, AHEAD_S)
     lines = np.array([figures(speak(u.speech), u, threshold) for u in said])
-    return lines[:, [0, 1, 3]]
+    _, energy, _, closure, _ = np.nanmean(lines, axis=0)
+    return Row(speaker.late_s(AHEAD_S), lines[:, 0], float(energy), float(closure))
 
 
-def print_table(found: dict[str, tuple[float, np.ndarray]]) -> None:
-    """Each look-ahead [clips, 3] beside the next one."""
-    errors = np.array([lines[:, 0] for _, lines in found.values()])
-    nearer = errors[:-1] - errors[1:]
-    chances = holm([float(wilcoxon(each).pvalue) for each in nearer])
-    print(f"\n| {' | '.join(COLUMNS)} |\n|---" + (len(COLUMNS) - 1) * "|---:" + "|")
-    for k, (ahead, (late_s, lines)) in enumerate(found.items()):
-        error, energy, closure = np.nanmean(lines, axis=0)
-        row = f"| {ahead} | {late_s:.2f} | {error:.3f} | {energy:.2f} | {closure:.2f} |"
-        last = k == len(nearer)
-        print(row + (" | | |" if last else f" {nearer[k].mean():.3f} | {(nearer[k] > 0).sum()} | {chances[k]:.1g} |"))
+def table(rows: Mapping[int, Row]) -> list[str]:
+    """In Markdown, each look-ahead (ms) in a row, beside the next one."""
+    further = steps({"": {ms: row.errors for ms, row in rows.items()}})
+    compared = [f"{step.gain:.3f} | {step.nearer} of {step.sentences} | {step.p:.2g}" for step in further]
+    lines = [f"| {' | '.join(COLUMNS)} |", "|" + "---:|" * len(COLUMNS)]
+    for (ms, row), beside in zip(rows.items(), [*compared, " | | "], strict=True):
+        lines.append(f"| {ms} | {row.late_s:.2f} | {row.errors.mean():.3f} | {row.energy:.2f} | {row.closure:.2f} | {beside} |")
+    return lines
 
 
 if __name__ == "__main__":

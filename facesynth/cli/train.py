@@ -118,7 +118,8 @@ def _tell_learned(model: Method, recordings: Corpus, path: Path, face: Path | No
     lines += model.facts.get("findings", ())
     if face:
         lines.append(f"{face}: {face.stat().st_size / 1e6:.1f} MB, the speaker's pictures; keep it beside the model")
-    lines.append(f'{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav --text "…" -o out.mp4`')
+    words = '--text "…" ' if model.needs_phones else ""
+    lines.append(f"{path}: {size_mb:.1f} MB; speak with `facesynth speak {path} speech.wav {words}-o out.mp4`")
     show(as_json, {**facts, "synthetic": recordings.synthetic}, lines)
 
 

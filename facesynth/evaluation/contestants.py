@@ -98,11 +98,23 @@ def references(contestants: Sequence[Contestant] = ()) -> list[Contestant]:
 
 
 def without_phones(rows: Sequence[Contestant], corpus: Corpus) -> tuple[list[Contestant], list[str]]:
-    """The reference rows that a corpus can teach, and labels of those that ask for phones where it has none."""
+    """The reference rows that a corpus can teach, and labels of those that ask for phones where it has none.
+
+    A row whose method can do with the sound alone does with it there.
+    """
     if not corpus.without_phones():
         return list(rows), []
-    asking = [one.label for one in rows if one.create().needs_phones]
-    return [one for one in rows if one.label not in asking], asking
+    heard = [_by_sound(one) for one in rows]
+    asking = [one.label for one in heard if one.create().needs_phones]
+    return [one for one in heard if one.label not in asking], asking
+
+
+def _by_sound(one: Contestant) -> Contestant:
+    """The same, told nothing of what is said, where its method can do without."""
+    settings = capabilities_of(one.method).by_sound
+    if not settings or not one.create().needs_phones:
+        return one
+    return replace(one, label=f"{one.label} by sound", settings={**one.settings, **settings})
 
 
 def contestant(spec: str) -> Contestant:

@@ -214,6 +214,8 @@ class Capabilities:
     """Of the protocols above."""
     needs_phones: bool = True
     """Whether it must be told what is said; one that hears the sound alone is asked for none, but may use given ones."""
+    by_sound: Mapping[str, Any] = field(default_factory=dict)
+    """Settings with which it hears the sound alone, where its defaults must be told what is said."""
     layouts: tuple[str, ...] = ("markers", "landmarks", "curves")
     """Kinds of motion that it learns."""
     minutes: float = 0.0

@@ -79,7 +79,7 @@ def test_it_is_trained_and_speaks(corpus, asked, tmp_path, monkeypatch):
     heard = phone_sources.FoundPhones(PhoneTrack(("p", "aa"), np.array([0.2, 0.5])), (), ("music is heard",), "listening")
     monkeypatch.setattr(phone_sources, "_listened", lambda *_: heard)
     model, sound = tmp_path / "m.safetensors", tmp_path / "line.wav"
-    run(train, asked[0], corpus.path, *asked[1:], "-o", model)
+    assert "--text" not in run(train, asked[0], corpus.path, *asked[1:], "-o", model).stdout
     speech = corpus[corpus.ids[1]].speech
     save_wav(sound, speech.audio, speech.sample_rate)
     told = run(speak, model, sound, "-o", tmp_path / "line.npz")
@@ -98,8 +98,9 @@ def test_what_needs_phones_says_so_before_it_learns(corpus, name):
 
 def test_reference_rows_that_ask_for_phones_are_left_out_and_named(corpus, tmp_path, monkeypatch):
     kept, asking = without_phones(references(), corpus)
-    assert set(asking) == {"network", "phone mean", "viseme table"}
-    assert {"mean face", "ridge", "tcn"} <= {one.label for one in kept}
+    assert set(asking) == {"phone mean", "viseme table"}
+    assert {"mean face", "ridge", "tcn", "network by sound"} <= {one.label for one in kept}
+    assert not any(one.create().needs_phones for one in kept)
     some = [one for one in references() if one.label in ("mean face", "phone mean")]
     import_module("facesynth.evaluation.report")  # it shall keep the real rows
     monkeypatch.setattr(contestants, "references", lambda *_: some)

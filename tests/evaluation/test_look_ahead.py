@@ -1,0 +1,44 @@
+"""What waiting is worth to a network: known differences, the script that prints them, and the card that states them."""
+
+import runpy
+import sys
+from importlib import import_module
+
+import numpy as np
+import pytest
+from corpora import tiny_corpus
+
+from facesynth.methods.learn import windows
+
+
+@pytest.fixture
+def benchmark(monkeypatch, repository):
+    """A function that imports a module of benchmarks/."""
+    monkeypatch.syspath_prepend(repository / "benchmarks")
+    return import_module
+
+
+def test_each_look_ahead_stands_beside_the_next_clip_by_clip(benchmark):
+    look_ahead = benchmark("look_ahead")
+    errors = np.random.default_rng(0).uniform(1.5, 2, 40)
+    rows = {0: errors + 0.1, 40: errors, 80: errors[::-1]}
+    lines = look_ahead.table({ms: look_ahead.Row(0.1 + ms / 1000, each, 0.6, 0.9) for ms, each in rows.items()})
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    assert {len(row) for row in cells} == {len(look_ahead.COLUMNS)}
+    assert [row[:2] for row in cells[2:]] == [["0", "0.10"], ["40", "0.14"], ["80", "0.18"]]
+    assert cells[2][5:7] == ["0.100", "40 of 40"]
+    assert float(cells[2][7]) < 1e-6
+    assert float(cells[3][7]) > 0.1
+    assert cells[4][5:] == ["", "", ""]
+
+
+def test_networks_that_wait_longer_are_streams_that_are_later(benchmark, monkeypatch, repository, tmp_path, capsys):
+    monkeypatch.setattr(windows, "BATCH", 2)
+    monkeypatch.setattr(benchmark("network_variants"), "LOOK_AHEAD_MS", (0, 80))
+    corpus = tiny_corpus(tmp_path / "corpus", utterances=15, fps=25)
+    monkeypatch.setattr(sys, "argv", ["look_ahead.py", str(corpus.path), "-o", str(tmp_path / "kept"), "--steps", "1"])
+    runpy.run_path(str(repository / "benchmarks" / "look_ahead.py"), run_name="__main__")
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")][2:]
+    cells = [[cell.strip() for cell in line.split("|")[1:]] for line in lines]
+    assert [int(row[0]) for row in cells] == [0, 80, 720]
+    assert np.ptp([float(row[1]) - int(row[0]) / 1000 for row in cells]) <= 0.01 + 1e-9
