@@ -9,10 +9,10 @@ from scipy.stats import wilcoxon
 from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
-from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate
+from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate, require_parting
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.paired import holm
-from facesynth.evaluation.sync import SyncJudge
+from facesynth.evaluation.sync import SyncJudge, in_step
 from facesynth.evaluation.two_sample import two_sample
 from facesynth.inference.closures import close_at
 from facesynth.inference.lips import bilabial_spans
@@ -29,10 +29,9 @@ BEST = "eFASE soft, lips sharpened, residual"
 class Judge:
     """Figures of rows on the tested clips, kept in a file."""
 
-    def __init__(self, learned: Corpus, tested: Corpus, nearest: float, path: Path) -> None:
-        """nearest: gap of the lips to which the same step closes them in all rows."""
-        self.tested, self.nearest, self.path = tested, nearest, path
-        self.threshold = closure_threshold((u.motion, u.speech.phones) for u in tested)
+    def __init__(self, learned: Corpus, tested: Corpus, threshold: float, nearest: float, path: Path) -> None:
+        """threshold: gap of the lips that counts as shut; nearest: that to which the same step closes them in all rows."""
+        self.tested, self.threshold, self.nearest, self.path = tested, threshold, nearest, path
         self.sync = SyncJudge.learn(learned)
         self.recorded = {u.id: u.motion for u in tested}
         self.rows: dict[str, np.ndarray] = dict(np.load(path)) if path.is_file() else {}
@@ -40,10 +39,11 @@ class Judge:
     def add(self, row: str, motions: Motions) -> None:
         """Measure a row and keep it."""
         apart = told_apart(self.sync, motions, self.recorded)
+        steps = in_step([shift_ms(self.sync, u, motions[u.id]) for u in self.tested])
         lines = []
-        for u in self.tested:
+        for u, step in zip(self.tested, steps, strict=True):
             own, shut = (figures(m, u, self.threshold) for m in (motions[u.id], closed(motions[u.id], u, self.nearest)))
-            lines.append([*own, shut[0], *shut[3:], in_step(self.sync, u, motions[u.id]), apart.get(u.id, np.nan)])
+            lines.append([*own, shut[0], *shut[3:], step, apart.get(u.id, np.nan)])
         self.rows[row] = np.array(lines)
         np.savez(self.path, **self.rows)
 
@@ -109,7 +109,7 @@ def differences(each: np.ndarray) -> np.ndarray:
 
 def cells(lines: np.ndarray) -> str:
     means = [np.nanmean(column) if np.isfinite(column).any() else np.nan for column in lines.T]
-    return " | ".join(f"{mean:.3f}" if k in (0, 5) else f"{mean:.2f}" for k, mean in enumerate(means))
+    return " | ".join("" if np.isnan(mean) else f"{mean:.3f}" if k in (0, 5) else f"{mean:.2f}" for k, mean in enumerate(means))
 
 
 def told_apart(judge: SyncJudge, motions: Motions, recorded: Motions) -> dict[str, float]:
@@ -150,9 +150,19 @@ def closed(motion: Motion, utterance: Utterance, nearest: float) -> Motion:
     return Motion(frames.astype(np.float32), motion.fps, motion.layout)
 
 
-def in_step(judge: SyncJudge, utterance: Utterance, motion: Motion) -> float:
-    """1 where lips fit the sound best without a shift, 0 elsewhere, NaN where that cannot be told."""
+def shift_ms(judge: SyncJudge, utterance: Utterance, motion: Motion) -> float | None:
+    """How late the lips are; None where that cannot be told."""
     try:
-        return float(judge.shift_ms(utterance.speech, motion) == 0)
+        return judge.shift_ms(utterance.speech, motion)
+    except UnavailableError:
+        return None
+
+
+def threshold_of(corpus: Corpus) -> float:
+    """What counts as shut, for all folds the same; NaN, which leaves closures out, where lips part no further on average."""
+    threshold = closure_threshold((u.motion, u.speech.phones) for u in corpus)
+    try:
+        require_parting((u.motion for u in corpus), threshold)
     except UnavailableError:
         return float("nan")
+    return threshold

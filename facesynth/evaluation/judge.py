@@ -12,7 +12,7 @@ from facesynth.evaluation.folds import some_of
 from facesynth.evaluation.lips import closure_threshold, require_parting
 from facesynth.evaluation.metrics import METRICS, Case
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.evaluation.sync import SyncJudge
+from facesynth.evaluation.sync import NEVER_MOVES, SyncJudge, in_step
 from facesynth.evaluation.table import Row
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
@@ -98,6 +98,7 @@ class Tally:
         self.values: dict[str, list[float]] = {}
         self.reasons: dict[str, str] = {}
         self.emotions: list[tuple[str, str]] = []
+        self.shifts_ms: dict[int, float] = {}
         self.count = 0
 
     def add(self, judge: Judge, utterance: Utterance, motion: Motion, part: Part = "mouth") -> None:
@@ -136,19 +137,27 @@ class Tally:
 
     def row(self, label: str, costs: Mapping[str, float]) -> Row:
         """The method's row."""
-        values = {name: tuple(column + [NAN] * (self.count - len(column))) for name, column in self.values.items()}
+        columns = self.values | self._sync()
+        values = {name: tuple(column + [NAN] * (self.count - len(column))) for name, column in columns.items()}
         return Row(label, values, costs, self.reasons, confusion_of(self.emotions))
 
     def _add_sync(self, judge: Judge, utterance: Utterance, motion: Motion) -> None:
         if judge.sync is None:
             return
         try:
-            shift_ms = judge.sync.shift_ms(utterance.speech, motion)
+            self.shifts_ms[self.count - 1] = judge.sync.shift_ms(utterance.speech, motion)
         except UnavailableError as reason:
             self.reasons.setdefault("sync_rate", str(reason))
-            return
-        self.set("sync_rate", float(shift_ms == 0))
-        self.set("sync_offset", shift_ms)
+
+    def _sync(self) -> dict[str, list[float]]:
+        """How often the lips are in step, and how late they are."""
+        if not self.shifts_ms:
+            return {}
+        found = in_step([self.shifts_ms.get(number) for number in range(self.count)])
+        if np.isnan(found).all():
+            self.explain(("sync_rate", "sync_offset"), NEVER_MOVES)
+            return {}
+        return {"sync_rate": found.tolist(), "sync_offset": [self.shifts_ms.get(number, NAN) for number in range(self.count)]}
 
     def _add_emotion(self, judge: Judge, asked: str, motion: Motion) -> None:
         if judge.recogniser is None:

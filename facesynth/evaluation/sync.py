@@ -1,9 +1,13 @@
 """Whether lips go with the sound: a small network that learned, from other recordings, to tell what is in step from what is not.
 
 Two short stretches, of the sound and of the lips' movement around the same frame, are each turned into a unit vector; their
-product is high where both belong to one moment. A motion is as late as the shift at which the mean product is highest.
+product is high where both belong to one moment. A motion is as late as the shift at which the vectors' covariance over time is
+largest. Without their means it would be a mean product, and a motion that hardly moves would be in step where a recording
+begins and ends in silence: of its sound the unshifted one has the most frames of silence, which go with lips at rest. Lips that
+do not move at all go with nothing.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -32,6 +36,9 @@ BANDS, WIDTH, VECTOR = 40, 64, 32
 STEPS, BATCH, LEARNING_RATE, SHARPNESS = 200, 256, 3e-3, 8.0
 FEWEST_FRAMES = 200
 """Frames of recordings, under which nothing is learned."""
+STILL = 0.01
+"""Of the recorded deviation: lips that move less than that stand still."""
+NEVER_MOVES = "the lips never move, and no sound goes with that"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +69,16 @@ class SyncJudge:
         return judge
 
     def shift_ms(self, speech: Speech, motion: Motion) -> float:
-        """How late the lips are for the sound (ms), whole frames of RATE; UnavailableError for motions that are too short."""
+        """How late the lips are for the sound (ms), whole frames of RATE; NaN where they stand still.
+
+        UnavailableError for motions that are too short.
+        """
         sound, lips = self._stretches(speech, motion)
         present = torch.isfinite(lips).all(dim=1)
         if len(sound) <= 2 * MOST_SHIFT or int(present.sum()) <= 2 * MOST_SHIFT:
             raise UnavailableError("the utterance is too short to be shifted")
+        if np.nanstd(self.shapes.of(motion), axis=0).max() < STILL:
+            return float("nan")
         with torch.no_grad():
             heard, seen = _unit(self.sound(sound)), _unit(self.lips(torch.nan_to_num(lips)))
         agreement = [_agreement(heard, seen, present, shift) for shift in range(-MOST_SHIFT, MOST_SHIFT + 1)]
@@ -113,11 +125,14 @@ def _unit(vectors: Tensor) -> Tensor:
 
 
 def _agreement(heard: Tensor, seen: Tensor, present: Tensor, shift: int) -> float:
-    """Mean product where lips that are `shift` frames late are put beside the sound that they belong to."""
+    """Covariance where lips that are `shift` frames late are put beside the sound that they belong to."""
     count = len(heard)
     sound, lips = slice(max(0, -shift), count - max(0, shift)), slice(max(0, shift), count - max(0, -shift))
     there = present[lips]
-    return float((heard[sound] * seen[lips]).sum(dim=1)[there].mean()) if there.any() else -1.0
+    if not there.any():
+        return -1.0
+    heard, seen = heard[sound][there], seen[lips][there]
+    return float(((heard - heard.mean(dim=0)) * (seen - seen.mean(dim=0))).sum(dim=1).mean())
 
 
 def _offsets_s() -> NDArray[np.float64]:
@@ -136,6 +151,11 @@ def _bands(speech: Speech) -> Tensor:
     return mel(torch.from_numpy(np.ascontiguousarray(resample(speech.audio, speech.sample_rate, mel.sample_rate))))
 
 
-def sync_rate(shifts_ms: Array) -> float:
-    """Share of utterances whose best shift is none at all."""
-    return float((shifts_ms == 0).mean())
+def in_step(shifts_ms: Sequence[float | None]) -> Array:
+    """[U] for shifts of utterances (ms): 1 where none fits best, else 0, also for still lips (NaN); NaN where None is known.
+
+    All NaN where the lips of no utterance move: a face that rests is not judged by when it does so.
+    """
+    if not any(shift is not None and np.isfinite(shift) for shift in shifts_ms):
+        return np.full(len(shifts_ms), np.nan)
+    return np.array([np.nan if shift is None else float(shift == 0) for shift in shifts_ms])

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import torch
 
+from facesynth.evaluation.judge import Judge, Tally
 from facesynth.evaluation.lip_shapes import LipShapes, windows
 from facesynth.evaluation.pair import UnavailableError
-from facesynth.evaluation.sync import MOST_SHIFT, SyncJudge
+from facesynth.evaluation.sync import MOST_SHIFT, NEVER_MOVES, SyncJudge, in_step
 from facesynth.evaluation.two_sample import two_sample
 from facesynth.inference.filters import gaussian
 from facesynth.inference.layout import Layout
@@ -71,6 +72,37 @@ def test_lips_of_another_sentence_are_in_step_no_more_often_than_by_chance(judge
     assert np.mean(np.array(found) == 0) <= 0.4
 
 
+def in_silence(take):
+    """The take between half a second of silence on either side, lips at rest."""
+    quiet, rest = np.zeros(8000, np.float32), np.repeat(take.motion.frames[:1], 12, axis=0)
+    speech = replace(take.speech, audio=np.concatenate([quiet, take.speech.audio, quiet]), phones=PhoneTrack(("aa",), [4.0]))
+    speech = replace(speech, emotions=EmotionTrack.constant("neutral", 4.0))
+    return Take(speech, replace(take.motion, frames=np.concatenate([rest, take.motion.frames, rest])))
+
+
+def smaller(motion, share):
+    """The same movement about its mean, so much smaller."""
+    middle = motion.frames.mean(axis=0)
+    return replace(motion, frames=middle + np.float32(share) * (motion.frames - middle))
+
+
+def test_between_silences_too_it_matters_when_lips_move_and_not_how_much():
+    takes = [in_silence(one) for one in (*TAKES, *OTHERS)]
+    judge, others = SyncJudge.learn(Takes(takes[: len(TAKES)])), takes[len(TAKES) :]
+    pairs = [(one, other) for one in others for other in others if one is not other]
+    wrong = [judge.shift_ms(one.speech, smaller(other.motion, 0.015)) for one, other in pairs]
+    right = [judge.shift_ms(one.speech, smaller(one.motion, 0.015)) for one in others]
+    assert in_step(wrong).mean() <= 0.2
+    assert in_step(right).mean() >= 0.75
+
+
+def test_lips_that_never_move_go_with_no_sound(judge):
+    for one in OTHERS[:3]:
+        assert np.isnan(judge.shift_ms(one.speech, smaller(one.motion, 0.0)))
+    assert np.isnan(in_step([np.nan, None, np.nan])).all(), "nothing is said of a face that rests"
+    np.testing.assert_array_equal(in_step([0.0, 40.0, np.nan, None]), [1, 0, 0, np.nan])
+
+
 def test_motion_of_another_rate_is_judged_the_same(judge):
     fast = take(fps=60.0)
     assert abs(judge.shift_ms(fast.speech, fast.motion)) <= 40
@@ -125,17 +157,25 @@ def test_windows_are_all_stretches():
     assert windows(signal, 6).shape == (0, 6, 2)
 
 
-def test_a_table_tells_how_often_lips_are_in_step(judge):
-    from facesynth.evaluation.judge import Judge, Tally
+@dataclass(frozen=True)
+class Said(Take):
+    id: str
+    emotion: str = "neutral"
 
-    @dataclass(frozen=True)
-    class Said(Take):
-        id: str
-        emotion: str = "neutral"
 
+def row(judge, motions):
+    """What a table shows of motions for the sounds of OTHERS."""
     figures = Tally()
-    for late, one in ((0, OTHERS[0]), (4, OTHERS[1])):
-        figures.add(Judge(float("nan"), None, judge), Said(one.speech, one.motion, "one"), moved(one.motion, late))
-    row = figures.row("some", {})
-    assert row.values["sync_offset"] == pytest.approx((0, 160), abs=41)
-    assert row.values["sync_rate"][1] == 0
+    for one, motion in zip(OTHERS, motions, strict=False):
+        figures.add(Judge(float("nan"), None, judge), Said(one.speech, one.motion, "one"), motion)
+    return figures.row("some", {})
+
+
+def test_a_table_tells_how_often_lips_are_in_step_and_nothing_of_a_face_that_rests(judge):
+    still = [smaller(one.motion, 0.0) for one in OTHERS[:2]]
+    moving = row(judge, (OTHERS[0].motion, moved(OTHERS[1].motion, 4), smaller(OTHERS[2].motion, 0.0)))
+    assert moving.values["sync_offset"] == pytest.approx((0, 160, np.nan), abs=41, nan_ok=True)
+    assert moving.values["sync_rate"][1:] == (0, 0), "whoever stands still now and then gains nothing by it"
+    resting = row(judge, still)
+    assert "sync_rate" not in resting.values
+    assert resting.reasons["sync_rate"] == resting.reasons["sync_offset"] == NEVER_MOVES
