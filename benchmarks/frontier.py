@@ -20,7 +20,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from frontier_table import Judge, Motions, join, threshold_of
+from frontier_table import Judge, Motions, join
 from network_variants import VARIANTS, fewer, inner, kept, parts
 
 from facesynth.config import load_config
@@ -78,9 +78,7 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
         return kept(options.output / f"{stem}_{name}.safetensors", some, VARIANTS[variant], 0, options.device)
 
     whole = network(rest, "whole")
-    judge = Judge(
-        rest, tested, threshold_of(corpus), whole.facts["closed_gap"], options.output / f"figures_{len(rest)}_{fold}.npz"
-    )
+    judge = Judge(rest, tested, whole.facts["closed_gap"], options.output / f"figures_{len(rest)}_{fold}.npz")
     makers = {
         "network": lambda net, _: net,
         "eFASE soft": soft_efase,

@@ -9,7 +9,8 @@ from scipy.stats import wilcoxon
 from facesynth.corpus import Corpus, Utterance
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
-from facesynth.evaluation.lips import closure_rate, closure_threshold, false_closure_rate, require_parting
+from facesynth.evaluation.judge import shut_opening
+from facesynth.evaluation.lips import closure_rate, false_closure_rate
 from facesynth.evaluation.pair import UnavailableError
 from facesynth.evaluation.paired import holm
 from facesynth.evaluation.sync import SyncJudge, in_step
@@ -29,9 +30,10 @@ BEST = "eFASE soft, lips sharpened, residual"
 class Judge:
     """Figures of rows on the tested clips, kept in a file."""
 
-    def __init__(self, learned: Corpus, tested: Corpus, threshold: float, nearest: float, path: Path) -> None:
-        """threshold: gap of the lips that counts as shut; nearest: that to which the same step closes them in all rows."""
-        self.tested, self.threshold, self.nearest, self.path = tested, threshold, nearest, path
+    def __init__(self, learned: Corpus, tested: Corpus, nearest: float, path: Path) -> None:
+        """nearest: gap of the lips to which the same step closes them in all rows."""
+        self.tested, self.nearest, self.path = tested, nearest, path
+        self.threshold = shut_opening(tested, [learned])
         self.sync = SyncJudge.learn(learned)
         self.recorded = {u.id: u.motion for u in tested}
         self.rows: dict[str, np.ndarray] = dict(np.load(path)) if path.is_file() else {}
@@ -156,13 +158,3 @@ def shift_ms(judge: SyncJudge, utterance: Utterance, motion: Motion) -> float | 
         return judge.shift_ms(utterance.speech, motion)
     except UnavailableError:
         return None
-
-
-def threshold_of(corpus: Corpus) -> float:
-    """What counts as shut, for all folds the same; NaN, which leaves closures out, where lips part no further on average."""
-    threshold = closure_threshold((u.motion, u.speech.phones) for u in corpus)
-    try:
-        require_parting((u.motion for u in corpus), threshold)
-    except UnavailableError:
-        return float("nan")
-    return threshold

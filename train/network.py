@@ -7,6 +7,10 @@ come, which emotion. Out comes the pose in the middle of those that go with them
 is the distance of points, lips four times as much as others, and of their velocities. Windows of about two seconds are drawn
 from the recordings, a little faster or slower, louder or softer, with noise and silent bands: two hundred sentences are few.
 The weights that are kept are the mean of those of the last hundred steps or so.
+
+Beside the network stands a linear regression, by least squares, from the same bands and a layer of the network that hears phones,
+eleven frames around each. What is said is 0.6 of the one and 0.4 of the other (0.8 and 0.2 among several emotions): they err in
+different places.
 """
 
 import argparse
@@ -44,9 +48,15 @@ def main() -> None:
     model.learned_from(recorded)
     predictor = model.predictor
 
-    # prepare: bands and components of every recording, how they are standardised, first weights
+    # prepare: what is heard in every recording and its components, how they are standardised, first weights
     windows = predictor.prepare(recorded, options.seed)
     predictor.answer_in(nn.Identity())
+
+    # the regression beside the network: one solution, no steps
+    predictor.learn_beside(windows)
+    print(f"a regression stands beside the network, {predictor.linear.share:.0%} of the pose is its")
+
+    # the network: what is made small, its averaged weights, how it learns
     loss_of, network = predictor.loss(recorded.layout), predictor.network
     averaged, (optimiser, schedule) = deepcopy(network), learning(network, options.steps)
     rng, losses = np.random.default_rng(options.seed), []

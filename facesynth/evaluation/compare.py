@@ -24,7 +24,7 @@ from facesynth.evaluation.curve import Curve, curves_of
 from facesynth.evaluation.details import Details, residual_reach
 from facesynth.evaluation.folds import Fold, check_folds, minutes_of, read_folds, rest_of, write_folds
 from facesynth.evaluation.jobs import Job, read_account, run_job
-from facesynth.evaluation.judge import APART, Judge, confusion_of, recogniser_of, sync_of
+from facesynth.evaluation.judge import APART, Judge, confusion_of, recogniser_of, shut_opening, sync_of
 from facesynth.evaluation.metrics import METRICS
 from facesynth.evaluation.paired import Difference, compare_pairs
 from facesynth.evaluation.part_statistics import PART_COLUMNS
@@ -223,7 +223,7 @@ def predicted_labels(predictions: Path, families: Sequence[Family] = ()) -> list
 
 def judges_of(corpus: Corpus, folds: Sequence[Fold], tested: Corpus) -> dict[str, Judge]:
     """By tested utterance: one threshold of closure for all, and a recogniser that learned from its fold's other sentences."""
-    threshold = Judge.from_recordings(corpus.subset(()), tested).closure_threshold
+    threshold = shut_opening(tested, (corpus.subset(fold.train) for fold in folds))
     judges: dict[str, Judge] = {}
     for fold in track(folds, "judges", len(folds)):
         train = corpus.subset(fold.train)

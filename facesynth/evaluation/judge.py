@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -36,16 +35,6 @@ class Judge:
     sync: SyncJudge | None = None
     """None where the training recordings are too few, or of no lips."""
 
-    @classmethod
-    def from_recordings(cls, train: Corpus, test: Corpus) -> Self:
-        """The threshold from the truth that is tested on (in all folds), the recogniser from the sentences that are not."""
-        try:
-            threshold = closure_threshold((utterance.motion, utterance.speech.phones) for utterance in test)
-            require_parting((utterance.motion for utterance in test), threshold)
-        except UnavailableError:
-            threshold = NAN
-        return cls(threshold, recogniser_of(train), sync_of(train))
-
     def figures(self, utterance: Utterance, motion: Motion, part: Part = "mouth") -> Iterator[tuple[str, float, str]]:
         """(metric, value, reason why it is NaN) of one utterance; part: what the method moves, a mouth moving the others too."""
         case = Case(motion, utterance.motion, utterance.speech.phones, self.closure_threshold)
@@ -69,6 +58,21 @@ class Judge:
 def moves_alone(part: Part) -> str:
     """Why a figure is missing."""
     return f"the method moves the {part} alone"
+
+
+def shut_opening(test: Corpus, learned: Iterable[Corpus]) -> float:
+    """Opening that counts as shut, from what is tested, for methods that learned from those recordings, of each fold.
+
+    NaN where nobody says p, b or m, or where a face that holds the mean pose, of what is tested or of what was learned from,
+    would be shut all the time: closures say nothing there.
+    """
+    try:
+        threshold = closure_threshold((utterance.motion, utterance.speech.phones) for utterance in test)
+        for some in (test, *(train.subset(some_of(train.ids, MOST_LEARNED, 0)) for train in learned if train.ids)):
+            require_parting((utterance.motion for utterance in some), threshold)
+    except UnavailableError:
+        return NAN
+    return threshold
 
 
 def recogniser_of(train: Corpus) -> EmotionRecogniser | None:

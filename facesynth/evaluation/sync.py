@@ -1,10 +1,10 @@
 """Whether lips go with the sound: a small network that learned, from other recordings, to tell what is in step from what is not.
 
 Two short stretches, of the sound and of the lips' movement around the same frame, are each turned into a unit vector; their
-product is high where both belong to one moment. A motion is as late as the shift at which the vectors' covariance over time is
-largest. Without their means it would be a mean product, and a motion that hardly moves would be in step where a recording
-begins and ends in silence: of its sound the unshifted one has the most frames of silence, which go with lips at rest. Lips that
-do not move at all go with nothing.
+product is high where both belong to one moment. A motion is as late as the shift at which the mean product is highest.
+
+Lips that hardly move go with nothing. Their product would depend on the sound alone, and where a recording begins and ends in
+silence be highest unshifted, for that is where all of the silence is heard, which goes with lips at rest.
 """
 
 from collections.abc import Sequence
@@ -36,9 +36,9 @@ BANDS, WIDTH, VECTOR = 40, 64, 32
 STEPS, BATCH, LEARNING_RATE, SHARPNESS = 200, 256, 3e-3, 8.0
 FEWEST_FRAMES = 200
 """Frames of recordings, under which nothing is learned."""
-STILL = 0.01
-"""Of the recorded deviation: lips that move less than that stand still."""
-NEVER_MOVES = "the lips never move, and no sound goes with that"
+STILL = 0.1
+"""Lips whose every component moves less than this share of its recorded deviation stand still."""
+NEVER_MOVES = "the lips stand still (a tenth of the recorded movement counts), and no sound goes with that"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +125,11 @@ def _unit(vectors: Tensor) -> Tensor:
 
 
 def _agreement(heard: Tensor, seen: Tensor, present: Tensor, shift: int) -> float:
-    """Covariance where lips that are `shift` frames late are put beside the sound that they belong to."""
+    """Mean product where lips that are `shift` frames late are put beside the sound that they belong to."""
     count = len(heard)
     sound, lips = slice(max(0, -shift), count - max(0, shift)), slice(max(0, shift), count - max(0, -shift))
     there = present[lips]
-    if not there.any():
-        return -1.0
-    heard, seen = heard[sound][there], seen[lips][there]
-    return float(((heard - heard.mean(dim=0)) * (seen - seen.mean(dim=0))).sum(dim=1).mean())
+    return float((heard[sound] * seen[lips]).sum(dim=1)[there].mean()) if there.any() else -1.0
 
 
 def _offsets_s() -> NDArray[np.float64]:

@@ -283,3 +283,5 @@ def test_the_script_that_shows_the_loop_learns_what_fit_learns(halves, tmp_path,
     speech = held_out[held_out.ids[0]].speech
     np.testing.assert_allclose(shown.synthesize(speech).frames, fitted.synthesize(speech).frames, atol=1e-5)
     assert "held out: lips" in said
+    assert f"{fitted.predictor.linear.share:.0%} of the pose is its" in said
+    torch.testing.assert_close(shown.predictor.linear.weight, fitted.predictor.linear.weight)

@@ -94,13 +94,14 @@ class PosePredictor(nn.Module):
         encode: frames [T, C] to the coordinates [T, D] that are asked for, an affine map.
         """
         windows = self.prepare(corpus, seed)
+        self.learn_beside(windows)
         self.answer_in(encode)
         self.network = train(self.network, self.loss(corpus.layout), windows, steps or STEPS, seed)
         self.pca = _no_components()  # `into` and `onto` say the rest
         self.eval()
 
     def prepare(self, corpus: Corpus, seed: int) -> Windows:
-        """Everything but the network's weights, which start anew; what these are to be trained on."""
+        """Everything but what is learned from windows: the network's weights, which start anew, and the regression beside it."""
         device = self.scale.device
         self.fps = torch.full_like(self.fps, corpus.fps)
         self.emotion_count = torch.full_like(self.emotion_count, len(corpus.emotions))
@@ -115,9 +116,12 @@ class PosePredictor(nn.Module):
         inputs = len(columns) or self.reading.width
         self.network = PoseNetwork(inputs, self.pca.basis.shape[1], seed=seed, columns=columns).to(device)
         recordings = [self.recording(*one, corpus.emotions) for one in zip(corpus, heard, strict=True)]
-        if self.hearing.features != "log_mel":
-            self.linear.learn(recordings, self.reading, self.ahead)
         return Windows(recordings, self.reading, self.ahead, self.unsaid, BANDS if len(columns) else None)
+
+    def learn_beside(self, windows: Windows) -> None:
+        """The linear regression that what is expected is a share of; none where log-mel bands alone are heard."""
+        if self.hearing.features != "log_mel":
+            self.linear.learn(windows.recordings, self.reading, self.ahead)
 
     def read_by_network(self) -> Tensor:
         """Columns of what is told that the network reads: all of them (an empty list), or all but the phone network's layer.
