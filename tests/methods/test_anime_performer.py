@@ -1,5 +1,6 @@
 """The anime graph on the built-in performer: what its maps, its filters and its closures are worth on sentences left out."""
 
+import runpy
 from itertools import permutations
 
 import numpy as np
@@ -34,6 +35,17 @@ def test_maps_come_nearer_than_nothing_and_than_the_mean_difference(performer, m
         assert score.sentences >= 15
         assert score.helps("exponential cross-validated"), score
         assert score.mapped["exponential cross-validated"] < 1.02 * score.mapped[score.best], score
+
+
+def test_where_a_rotation_mixes_speech_into_every_component_maps_come_nearer_all_the_same(performer, model, repository):
+    rotated = runpy.run_path(str(repository / "benchmarks" / "emotion_maps.py"))["rotated"]
+    takes = [take for take in (take_of(u, model.components) for u in performer) if take is not None]
+    way = rotated(learner(performer.layout, variance=0.98), performer, 0)
+    trial = MapTrial(takes, performer.layout, way, kinds=("exponential cross-validated",)).with_sentences(12)
+    assert trial.without().split.mixed
+    for pair in permutations(performer.emotions, 2):
+        score = trial.score(*pair, folds=3)
+        assert score.helps("exponential cross-validated"), score
 
 
 def test_lips_still_close_in_every_other_emotion(split, model):
