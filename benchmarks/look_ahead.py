@@ -15,7 +15,7 @@ import numpy as np
 from frontier_curve import steps
 from frontier_table import figures
 from network_variants import BY_EAR, LOOK_AHEAD_MS, VARIANTS, Variant, file_of, inner, kept, parts
-from streams import streamed
+from streams import RATE, streamed
 
 from facesynth.corpus import Corpus
 from facesynth.evaluation.lips import closure_threshold
@@ -67,7 +67,7 @@ def judged(network: Network, clips: Corpus) -> Row:
     """What its stream gives of clips that it never heard."""
     said, speaker = list(clips), network.speaker()
     threshold = closure_threshold((u.motion, u.speech.phones) for u in said)
-    speak = streamed(speaker, AHEAD_S)
+    speak = streamed(speaker, AHEAD_S, piece=RATE)  # a second; how it is cut changes nothing
     lines = np.array([figures(speak(u.speech), u, threshold) for u in said])
     _, energy, _, closure, _ = np.nanmean(lines, axis=0)
     return Row(speaker.late_s(AHEAD_S), lines[:, 0], float(energy), float(closure))

@@ -79,13 +79,13 @@ def as_streamed(speaker: Network) -> Network:
     return replace(speaker, sharpening=0.0, closed_gap=np.inf, openings=None, beside=None, residual=None)
 
 
-def streamed(speaker: Network, ahead_s: float) -> Speaker:
-    """Sound in pieces of PIECE samples."""
+def streamed(speaker: Network, ahead_s: float, piece: int = PIECE) -> Speaker:
+    """Sound in pieces of so many samples."""
 
     def speak(speech: Speech) -> Motion:
         stream = speaker.stream(ahead_s=ahead_s)
         sound = resample(speech.audio, speech.sample_rate, RATE)
-        frames = [stream.push(sound[at : at + PIECE]) for at in range(0, len(sound), PIECE)]
+        frames = [stream.push(sound[at : at + piece]) for at in range(0, len(sound), piece)]
         return Motion(np.concatenate([*frames, stream.finish()]), speaker.fps, speaker.layout)
 
     return speak
