@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from facesynth.corpus import Corpus
@@ -191,9 +192,16 @@ def judge_predictions(
         tuple(corpus.record(i).emotion for i in tested.ids),
     )
     details = {one.row.label: one.details for one in judged}
-    return Evaluation(
-        comparison, details, compare_pairs(comparison), tuple(folds), sources, accounts, (remark,) if remark else ()
-    )
+    remarks = tuple(one for one in (remark, _without_closures(rows)) if one)
+    return Evaluation(comparison, details, compare_pairs(comparison), tuple(folds), sources, accounts, remarks)
+
+
+def _without_closures(rows: Sequence[Row]) -> str:
+    """Why no method has a column of closures; nothing where one has, or where none moves the mouth."""
+    mouths = [row for row in rows if not is_recorded(row.label) and np.isfinite(row.values.get("marker_error", ())).any()]
+    if not mouths or any(np.isfinite(row.values["closure_rate"]).any() for row in mouths):
+        return ""
+    return f"No column of closures: {mouths[0].reasons['closure_rate']}."
 
 
 def folds_beside(predictions: str | Path, corpus: Corpus) -> tuple[Fold, ...]:

@@ -106,8 +106,12 @@ def test_closing_is_refused_where_it_means_nothing(why, tmp_path):
         for name in corpus.ids:
             grid = corpus.files.phones(name)
             grid.write_text(grid.read_text(encoding="utf-8").replace('"m"', '"n"'), encoding="utf-8")
+    folds = make_folds(corpus, 2)
     with pytest.raises(FacesynthError, match=why):
-        nearest_gaps(corpus, make_folds(corpus, 2))
+        nearest_gaps(corpus, folds)
+    result = evaluate([Contestant("mean face", "mean_face")], corpus, folds, tmp_path / "r")
+    assert "closure_rate" not in result.main_columns()
+    assert any("No column of closures" in one and why.removeprefix("no ") in one for one in result.warnings())
 
 
 def test_the_verb_closes_lips_and_its_table_says_so(corpus, tmp_path):
