@@ -3,10 +3,14 @@
 import runpy
 import sys
 from importlib import import_module
+from time import process_time
 
 import numpy as np
 import pytest
 from corpora import tiny_corpus
+
+from facesynth.methods.learn.expectation import STEPS
+from facesynth.methods.network.method import Network
 
 COUNTS = (50, 100, 160)
 SENTENCES = 40
@@ -84,3 +88,18 @@ def test_the_network_learns_from_fewer_and_from_more_of_the_same_recordings(benc
     assert "3 clips (" in runs[0]
     assert "| network | " in runs[0]
     assert "- network, 3 to 6: " in runs[0]
+
+
+@pytest.mark.slow
+def test_learning_from_ten_minutes_takes_under_three_minutes_of_processor_time(tmp_path):
+    corpus = tiny_corpus(tmp_path / "corpus", utterances=480, fps=25)
+    assert sum(corpus.duration_s(name) for name in corpus.ids) > 600
+    few, more = (processor_seconds(corpus, steps) for steps in (20, 90))
+    assert few + (more - few) / 70 * (STEPS - 20) < 180, "hearing, regression and every step of the default network, one thread"
+
+
+def processor_seconds(corpus, steps):
+    """Of learning so many steps: those after the first ones cost the same each."""
+    began = process_time()
+    Network(steps=steps).fit(corpus)
+    return process_time() - began
