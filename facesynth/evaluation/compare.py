@@ -44,8 +44,9 @@ FOLDS = "folds.json"
 PREDICTIONS = "predictions"
 MAIN = (
     "marker_error", "lve", "lve_centred", "lip_gap_corr", "closure_rate", "false_closure_rate", "energy_ratio",
-    "sync_rate", "two_sample", "diversity", "emotion_accuracy", "other_phones", "other_visemes", "head_cca", "head_distance",
-    *(column.name for column in PART_COLUMNS), "train_s", "train_cpu_s", "rtf", "rtf_cpu", "model_mb",
+    "sync_rate", "sync_offset", "two_sample", "diversity", "emotion_accuracy", "other_phones", "other_visemes",
+    "head_cca", "head_distance", *(column.name for column in PART_COLUMNS),
+    "train_s", "train_cpu_s", "rtf", "rtf_cpu", "model_mb",
 )  # fmt: skip
 """Columns of the short table; everything is in the CSV and the JSON."""
 OVERTAKEN = {"train_s": "train_cpu_s", "rtf": "rtf_cpu"}
