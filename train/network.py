@@ -25,7 +25,7 @@ from facesynth.corpus import Corpus
 from facesynth.device import device_of
 from facesynth.evaluation.dynamics import energy_ratio
 from facesynth.evaluation.geometry import lve
-from facesynth.methods.learn.expectation import LARGEST_GRADIENT, STEPS, average, learning
+from facesynth.methods.learn.expectation import STEPS, average, learning
 from facesynth.methods.network.method import Network
 
 EVERY = 100
@@ -58,25 +58,25 @@ def main() -> None:
 
     # the network: what is made small, its averaged weights, how it learns
     loss_of, network = predictor.loss(recorded.layout), predictor.network
-    averaged, (optimiser, schedule) = deepcopy(network), learning(network, options.steps)
+    averaged, (steps, optimiser, schedule, largest_gradient) = deepcopy(network), learning(network, options.steps)
     rng, losses = np.random.default_rng(options.seed), []
     print(f"{len(recorded)} recordings, {sum(p.numel() for p in network.parameters()):,} weights")
 
     # train
     network.train()
     torch.manual_seed(options.seed)
-    for step in range(options.steps):
+    for step in range(steps):
         batch = windows.draw(rng).to(device)
         poses, log_deviations = network(batch.told)
         loss = loss_of(poses, log_deviations, batch)
         optimiser.zero_grad()
         loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
+        nn.utils.clip_grad_norm_(network.parameters(), largest_gradient)
         optimiser.step()
         schedule.step()
         average(averaged, network, step)
         losses.append(loss.item())
-        if (step + 1) % EVERY == 0 or step + 1 == options.steps:
+        if (step + 1) % EVERY == 0 or step + 1 == steps:
             predictor.network = averaged.eval()
             made = [(model.synthesize(utterance.speech), utterance.motion) for utterance in held_out]
             lips, energy = (np.mean([figure(*pair) for pair in made]) for figure in (lve, energy_ratio))

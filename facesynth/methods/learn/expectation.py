@@ -18,12 +18,14 @@ from facesynth.inference.expectation import EACH, RATE, Expectation, Reading, Sa
 from facesynth.inference.layout import Layout
 from facesynth.inference.sound import resample
 from facesynth.inference.speech import Speech
+from facesynth.methods.learn import trainer
 from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.linear_path import LinearPath
 from facesynth.methods.learn.other_voices import other_voice
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
+from facesynth.methods.learn.trainer import Learning
 from facesynth.methods.learn.windows import Recording, Windows
 from facesynth.motion.pca import Pca
 from facesynth.progress import track
@@ -205,28 +207,25 @@ def _no_components() -> Pca:
 
 def train(network: PoseNetwork, loss: PointLoss, windows: Windows, steps: int, seed: int) -> PoseNetwork:
     """AdamW on windows drawn by seed; what comes back has the averaged weights."""
-    device, rng = next(network.parameters()).device, np.random.default_rng(seed)
-    averaged, (optimiser, schedule) = deepcopy(network), learning(network, steps)
-    network.train()
-    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):  # dropout draws from torch's own generator
-        torch.manual_seed(seed)
-        for step in track(range(steps), "learning what is expected", steps):
-            batch = windows.draw(rng).to(device)
-            optimiser.zero_grad()
-            missed: Tensor = loss(*network(batch.told), batch)
-            missed.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
-            nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
-            optimiser.step()
-            schedule.step()
-            average(averaged, network, step)
+    device, averaged = next(network.parameters()).device, deepcopy(network)
+
+    def missed(rng: np.random.Generator) -> Tensor:
+        batch = windows.draw(rng).to(device)
+        found: Tensor = loss(*network(batch.told), batch)
+        return found
+
+    taken = trainer.train(network, missed, learning(network, steps), seed, "learning what is expected")
+    for step, _ in enumerate(taken):
+        average(averaged, network, step)
     return averaged.eval()
 
 
-def learning(network: nn.Module, steps: int) -> tuple[torch.optim.AdamW, torch.optim.lr_scheduler.OneCycleLR]:
+def learning(network: nn.Module, steps: int) -> Learning:
     """The optimiser, and how its rate goes."""
     optimiser = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     total = max(steps, 2)
-    return optimiser, torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=total, pct_start=WARMING)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=total, pct_start=WARMING)
+    return Learning(steps, optimiser, schedule, LARGEST_GRADIENT)
 
 
 @torch.no_grad()

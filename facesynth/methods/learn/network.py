@@ -7,7 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from facesynth.progress import track
+from facesynth.methods.learn import trainer
+from facesynth.methods.learn.trainer import Learning
 
 RATE = 50.0
 """Frames that the network reads per second, Hz: the 20 ms of the ridge's 21 frames."""
@@ -43,24 +44,11 @@ def network(inputs: int, outputs: int, seed: int) -> nn.Sequential:
 def train(model: nn.Sequential, tracks: Sequence[Tracks], steps: int, seed: int, what: str) -> float:
     """AdamW on the squared error over random windows, the learning rate falling along a cosine.
 
-    Returns the mean loss of the last tenth of the steps. The same seed gives the same weights on the same machine with the
-    same number of threads. `what` is told beside the progress.
+    Returns the mean loss of the last tenth of the steps. `what` is told beside the progress.
     """
-    device = next(model.parameters()).device
     optimiser = torch.optim.AdamW(model.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    rng, losses = np.random.default_rng(seed), []
-    model.train()
-    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):  # dropout draws from torch's own generator
-        torch.manual_seed(seed)
-        for _ in track(range(steps), what, steps):
-            loss = _loss(model, _batch(tracks, rng))
-            optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]  # torch leaves it untyped
-            optimiser.step()
-            schedule.step()
-            losses.append(float(loss.detach()))
-    model.eval()
+    learning = Learning(steps, optimiser, torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps))
+    losses = list(trainer.train(model, lambda rng: _loss(model, _batch(tracks, rng)), learning, seed, what))
     return float(np.mean(losses[-max(1, steps // 10) :]))
 
 
