@@ -1,5 +1,6 @@
 """What waiting is worth to a network: known differences, the script that prints them, and the card that states them."""
 
+import re
 import runpy
 import sys
 from importlib import import_module
@@ -8,7 +9,10 @@ import numpy as np
 import pytest
 from corpora import tiny_corpus
 
+from facesynth.inference.folder import CARD
 from facesynth.methods.learn import windows
+from facesynth.zoo.card import read_card
+from facesynth.zoo.shelf import DEFAULT, PACKAGED
 
 
 @pytest.fixture
@@ -42,3 +46,14 @@ def test_networks_that_wait_longer_are_streams_that_are_later(benchmark, monkeyp
     cells = [[cell.strip() for cell in line.split("|")[1:]] for line in lines]
     assert [int(row[0]) for row in cells] == [0, 80, 720]
     assert np.ptp([float(row[1]) - int(row[0]) / 1000 for row in cells]) <= 0.01 + 1e-9
+
+
+def test_the_card_of_a_network_says_how_its_error_depends_on_what_it_may_hear_ahead(benchmark):
+    look_ahead = benchmark("look_ahead")
+    found = [figure for figure in read_card(PACKAGED / DEFAULT / CARD).figures if "look_ahead.py" in figure.command]
+    asked = [*look_ahead.LOOK_AHEAD_MS, 720]
+    rows = {ms: look_ahead.Row(1.0, np.full(3, figure.value), 0.6, 0.9) for ms, figure in zip(asked, found, strict=True)}
+    printed = "\n".join(["", *look_ahead.table(rows)])
+    assert [float(re.search(figure.found_by, printed).group(1)) for figure in found] == [figure.value for figure in found]
+    assert found[0].value > found[-1].value > 0
+    assert all(f"{ms} ms" in figure.what for ms, figure in zip(asked, found, strict=True))
