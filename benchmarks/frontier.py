@@ -15,11 +15,13 @@ import argparse
 import json
 from collections.abc import Callable
 from copy import deepcopy
-from functools import partial
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+import torch
 from frontier_table import Judge, Motions, join
 from network_variants import VARIANTS, fewer, inner, kept, parts
 
@@ -29,16 +31,23 @@ from facesynth.evaluation.same_words import said_words, same_words
 from facesynth.inference.filters import sharpen
 from facesynth.inference.motion import Motion
 from facesynth.inference.residual import ResidualMotion, loudness, main_emotion
+from facesynth.inference.speech import Speech
 from facesynth.methods.anime_graph.method import AnimeGraph
 from facesynth.methods.efase.method import Efase
+from facesynth.methods.efase.shares import PENALTY_S, learned_shares
+from facesynth.methods.learn.expectation import COMPONENTS
+from facesynth.methods.learn.frames import complete_frames
 from facesynth.methods.learn.point_loss import lip_points
 from facesynth.methods.learn.residual import Residual
 from facesynth.methods.learn.sharpening import matching_share
 from facesynth.methods.method import Method
 from facesynth.methods.network.method import Network
 from facesynth.methods.registry import create
+from facesynth.motion.pca import Pca
 
 CONFIGS = Path(__file__).parents[1] / "configs"
+BY_COMPONENT = "eFASE soft by component"
+Shares = tuple[tuple[float, ...], ...]
 AS_IT_COMES = {"learn": False, "sharpening": 0.0}
 REFERENCES = ("mean_face", "viseme_table", "phone_mean", "coarticulation", "ridge", "efase", "lds", "anime_graph", "tcn")
 
@@ -83,8 +92,19 @@ def one_fold(corpus: Corpus, fold: int, options: argparse.Namespace) -> None:
         "network": lambda net, _: net,
         "eFASE soft": soft_efase,
         "its search alone": search_alone,
+        BY_COMPONENT: lambda net, some: showing(soft_efase(net, some), chosen_shares()),
+        "network, raised by component": lambda net, _: Raised(net, *gains()),
         "anime graph soft": soft_graph,
     }
+
+    @cache
+    def chosen_shares() -> Shares:
+        return learned_shares(soft_efase(network(learned, "0"), learned), held_out)
+
+    @cache
+    def gains() -> tuple[Pca, np.ndarray]:
+        return raised_by(network(learned, "0"), learned, held_out)
+
     others = {} if options.clips else references(rest, tested, options.device)
     for row, speak in others.items():
         if row not in judge.rows and row in (options.rows or others):
@@ -123,13 +143,13 @@ def best_variant(folder: Path, fold: int) -> str:
     return min(found, key=lambda each: each["lve"])["variant"] if found else "both"
 
 
-def shares_of(model: Method, held_out: Corpus) -> tuple[float, float]:
+def shares_of(model: "Method | Raised", held_out: Corpus) -> tuple[float, float]:
     """How much is to be sharpened for lips, and for the whole face, to move as recorded."""
     pairs = [(model.synthesize(u.speech), u.motion) for u in held_out]
     return matching_share(pairs, lip_points(held_out.layout)), matching_share(pairs)
 
 
-def spoken(model: Method, some: Corpus) -> Motions:
+def spoken(model: "Method | Raised", some: Corpus) -> Motions:
     return {u.id: model.synthesize(u.speech) for u in some}
 
 
@@ -152,6 +172,39 @@ def soft_efase(network: Network, learned: Corpus) -> Efase:
     model.audio.predictor = deepcopy(network.predictor)
     model.audio.predictor.answer_in(model.pca.encode)
     return model.with_weights(**expecting)
+
+
+def showing(model: Efase, shares: Shares) -> Efase:
+    """The same, of each component such shares of what the search finds and of what is expected."""
+    model.show(shares)
+    return model
+
+
+class Raised:
+    """A network each of whose components is raised about the mean face."""
+
+    def __init__(self, network: Network, pca: Pca, gains: np.ndarray) -> None:
+        self.network, self.pca, self.gains = network, pca, gains
+
+    def synthesize(self, speech: Speech) -> Motion:
+        plain = self.network.synthesize(speech)
+        more = (plain.frames - self.pca.mean.numpy()) @ self.pca.basis.numpy() * (self.gains - 1) @ self.pca.basis.numpy().T
+        return replace(plain, frames=(plain.frames + more).astype(np.float32))
+
+
+def raised_by(network: Network, learned: Corpus, held_out: Corpus) -> tuple[Pca, np.ndarray]:
+    """Components, and by how much raising each brings a network nearest to recordings that it did not learn from."""
+    pca = Pca.fit(complete_frames(learned), COMPONENTS)
+    made, truth = [], []
+    for u in held_out:
+        plain = network.synthesize(u.speech).frames
+        count = min(len(plain), len(u.motion))
+        there = np.isfinite(u.motion.frames[:count]).all(axis=1)
+        for list_, frames in ((made, plain), (truth, u.motion.frames)):
+            list_.append(pca.encode(torch.from_numpy(frames[:count][there])).numpy())
+    x, y = np.concatenate(made).astype(np.float64), np.concatenate(truth)
+    more = (x * (y - x)).sum(axis=0) / ((1 + PENALTY_S * learned.fps / len(x)) * np.square(x).sum(axis=0))
+    return pca, 1 + more
 
 
 def search_alone(network: Network, learned: Corpus) -> Efase:

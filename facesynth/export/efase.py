@@ -46,6 +46,8 @@ def efase_content(model: Efase) -> Content:
         "rest": model.rest.cpu().numpy(),
         "names": np.frombuffer("\n".join(model.facts["names"]).encode(), np.uint8),
     }
+    if model.shares is not None:
+        arrays["shares"] = model.shares.astype(np.float32)
     heard, graphs = _hearing(model)
     told = {} if model.audio.predictor is None else {"expectation": predictor_settings(model.audio.predictor)}
     mean, basis = model.pca.mean.cpu().numpy(), model.pca.basis.cpu().numpy()

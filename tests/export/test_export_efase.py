@@ -248,6 +248,7 @@ def soft_model(small_corpus):
             components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, expected_share=0.3, sharpening=0.8
         ).fit(small_corpus)
     model.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
+    model.show(np.stack([np.linspace(0.9, 0.2, 6), np.linspace(0.1, 0.9, 6)]).tolist())
     return model
 
 
@@ -269,6 +270,15 @@ def test_means_over_paths_and_what_is_heard_are_those_of_torch(soft_pair, speech
         assert got.cost == pytest.approx(wanted.cost, rel=1e-5, abs=1e-9)
         assert names_of(runtime, got.nodes) == names_of(model, wanted.nodes)
         assert difference(runtime.synthesize(asked).frames, model.synthesize(asked).frames) < 1e-4
+
+
+def test_shares_of_components_are_those_of_torch(soft_pair):
+    model, runtime = soft_pair
+    if model.config["expected_share"] == 0:
+        assert model.shares is None
+        assert runtime.parts.shares is None
+    else:
+        np.testing.assert_array_equal(runtime.parts.shares, model.shares)
 
 
 def test_a_model_that_looks_at_the_whole_does_not_stream(soft_pair, speeches):

@@ -20,6 +20,8 @@ from facesynth.inference.efase.assembly import Smoothing, concatenate
 from facesynth.inference.efase.hearing import PoseDistances
 from facesynth.inference.errors import FacesynthError
 from facesynth.inference.filters import sharpen
+from facesynth.inference.motion import Motion
+from facesynth.methods.efase import shares
 from facesynth.methods.efase.learning import lattices_of, learn, logs_of, mean_error, pose_differences
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.learn import descent
@@ -137,6 +139,46 @@ def test_a_share_of_the_pose_is_the_expected_one(hearing, speech):
     assert np.abs(found - expected).max() > 1
     np.testing.assert_allclose(posed(0.25)[0], 0.75 * found + 0.25 * expected, atol=1e-9)
     np.testing.assert_allclose(posed(1.0)[0], expected, atol=1e-9)
+
+
+def posed(model, speech):
+    """What a model shows, what its search finds and what it expects, [T, D] each."""
+    speaker, labels = model.speaker, speech.phones.labels
+    about = labels, speech.emotions.per_phone(speech.phones)[0], speech.phones.frame_bounds(model.speaker.database_fps)
+    plan = speaker.plan(speech)
+    return speaker.coordinates(plan, *about), speaker.found(plan, *about), plan.expected
+
+
+def test_each_component_has_its_own_shares_of_what_is_found_and_expected(hearing, speech, tmp_path):
+    model = hearing.with_weights(expected_share=0.25)
+    one, found, expected = posed(model, speech)
+    count = found.shape[1]
+    model.show([[0.75] * count, [0.25] * count])
+    np.testing.assert_allclose(posed(model, speech)[0], one, atol=1e-9)
+    own, others = np.linspace(0, 1.5, count), np.linspace(1, -0.5, count)
+    model.show([own.tolist(), others.tolist()])
+    shown = posed(model, speech)[0]
+    np.testing.assert_allclose(shown, own * found + others * expected, atol=1e-4)
+    np.testing.assert_allclose(shown[:, 0], expected[:, 0], atol=1e-9)
+    model.save(tmp_path / "shares.safetensors")
+    np.testing.assert_array_equal(posed(load(tmp_path / "shares.safetensors"), speech)[0], shown)
+    np.testing.assert_array_equal(posed(model.with_weights(candidates=30), speech)[0], shown)
+    np.testing.assert_allclose(posed(model.with_weights(expected_share=1.0), speech)[0], expected, atol=1e-9)
+
+
+def test_shares_are_those_that_recordings_were_made_of(hearing, halves, monkeypatch):
+    model = hearing.with_weights(expected_share=0.5)
+    fps, made = model.speaker.database_fps, []
+    own, others = np.linspace(0.2, 1.1, model.pca.basis.shape[1]), np.linspace(0.9, 0.4, model.pca.basis.shape[1])
+    for utterance in list(halves[1])[:4]:
+        _, found, expected = posed(model, utterance.speech)
+        frames = model.pca.decode(torch.from_numpy(own * found + others * expected).float()).numpy()
+        frames[3] = np.nan
+        made.append(replace(utterance, motion=Motion(frames, fps, model.fitted_layout)))
+    monkeypatch.setattr(shares, "PENALTY_S", 0.0)
+    np.testing.assert_allclose(shares.learned_shares(model, made), [own, others], atol=0.02)
+    monkeypatch.setattr(shares, "PENALTY_S", 1e9)
+    np.testing.assert_allclose(shares.learned_shares(model, made), 0.5, atol=1e-6)
 
 
 @pytest.mark.parametrize("settings", [{"expected_share": 1.1, "pose_weight": 1.0}, {"expected_share": 0.5}])
@@ -272,6 +314,17 @@ def test_fitting_learns_from_its_own_corpus_alone_and_keeps_what_it_found(halves
     made = load(tmp_path / "learned.safetensors").synthesize(utterance.speech)
     assert made.frames.tobytes() == model.synthesize(utterance.speech).frames.tobytes()
     assert np.isfinite(marker_error(made, utterance.motion))
+
+
+def test_training_learns_shares_where_expected_poses_are_shown(halves, tmp_path, monkeypatch):
+    monkeypatch.setattr(prediction, "STEPS", 3)
+    settings = {"pose_weight": 0.5, "expected_share": 0.5, "temperature": 1.0, "candidates": 10, "components": 5, "learn": True}
+    model = train(Efase, halves[0].subset(halves[0].ids[:10]), settings, seed=4)
+    assert model.shares.shape == (2, 5)
+    assert not np.allclose(model.shares, 0.5, atol=0.01)
+    assert "shares" not in model.facts["learned"]
+    model.save(tmp_path / "learned.safetensors")
+    np.testing.assert_array_equal(load(tmp_path / "learned.safetensors").shares, model.shares)
 
 
 def test_the_sharpening_that_recordings_ask_for_is_found(halves):

@@ -73,7 +73,7 @@ class EfaseDraft:
 
     def _mark(self, plan: Plan, t: int, bounds: Sequence[int]) -> Hashable:
         names, mixture = self.model.names, plan.mixtures[t] if plan.mixtures is not None else None
-        shown = plan.nodes[t] < 0 or self.model.settings.expected_share > 0
+        shown = plan.nodes[t] < 0 or self.model.settings.expected_share > 0 or self.model.parts.shares is not None
         expected = (
             None if plan.expected is None or not shown else plan.expected[bounds[t] : bounds[t + 1]].round(SHARES).tobytes()
         )

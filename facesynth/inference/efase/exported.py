@@ -45,6 +45,7 @@ def load_efase(folder: Folder, threads: int) -> Efase:
             decode=lambda coordinates: decode(coordinates=coordinates[None])[0][0],
             hearing=_hearing(folder, arrays, nodes, threads),
             residual=exported_residual(folder, arrays),
+            shares=arrays.get("shares"),
             manifest=manifest,
         )
     )

@@ -83,6 +83,8 @@ class Parts:
     """What takes means over paths; numpy unless another is given."""
     residual: ResidualMotion | None = None
     """What moves beside the lips, whatever is said."""
+    shares: Floats | None = None
+    """[2, D] of each component, how much of what the search finds and of what is expected; else `expected_share` says both."""
     manifest: Mapping[str, Any] = field(default_factory=dict)
     """Of the folder that the model came from, if it came from one."""
 
@@ -265,15 +267,22 @@ class Efase:
     def coordinates(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         """[T, D] PCA coordinates of a plan, silence at rest in each phone's feeling, not yet sharpened.
 
-        Where a pose is expected of each frame, `expected_share` of it: what a mean over recorded movements and a regression
-        miss is not the same, so their mean is nearer than either (docs/frontier.md).
+        Where a pose is expected of each frame, `expected_share` of it, or learned shares of both for each component: what a mean
+        over recorded movements and a regression miss is not the same, so their mean is nearer than either (docs/frontier.md).
         """
-        rest = self.parts.rest[[self._emotion_index(feeling) for feeling in feelings]]
-        fps, smoothing = self.database_fps, self.settings.smoothing
-        found = concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
+        found = self.found(plan, labels, feelings, bounds)
+        if plan.expected is not None and self.parts.shares is not None:
+            own, expected = self.parts.shares
+            return np.asarray(own * found + expected * plan.expected)
         if plan.expected is None or self.settings.expected_share == 0:
             return found
         return found + self.settings.expected_share * (plan.expected - found)
+
+    def found(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
+        """[T, D] what the search found alone, joints smoothed and silence filled."""
+        rest = self.parts.rest[[self._emotion_index(feeling) for feeling in feelings]]
+        fps, smoothing = self.database_fps, self.settings.smoothing
+        return concatenate(self.nodes, plan.nodes, labels, bounds, rest, fps, smoothing, plan.mixtures, plan.expected)
 
     def _decoded(self, plan: Plan, labels: Sequence[str], feelings: Sequence[str], bounds: Ints) -> Floats:
         coordinates = self.coordinates(plan, labels, feelings, bounds)

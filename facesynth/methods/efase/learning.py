@@ -2,13 +2,14 @@
 
 The posterior mean is differentiable in every cost (see `soft`), so its squared distance to recordings that are not in
 the database is too. What is learned: PNT, a1 … a6, the two audio weights, the temperature, and one factor for each
-component of the sound and of the expected pose, as `descent` tells; and, on the sentences that say when to stop, how
-much the mean must be sharpened to move as quickly as they do.
+component of the sound and of the expected pose, as `descent` tells; then how much of each component is shown as found
+and as expected (`shares`); and, on the sentences that say when to stop, how much the mean must be sharpened to move as
+quickly as they do.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.warp import stretched
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.penalty import median_transition
+from facesynth.methods.efase.shares import learned_shares
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.learn.point_loss import lip_points
 from facesynth.methods.learn.sharpening import matching_share
@@ -43,11 +45,14 @@ class LearnedMetrics(Learned):
 
     sound_metric: tuple[float, ...]
     pose_metric: tuple[float, ...]
+    shares: tuple[tuple[float, ...], ...] = ()
+    """Of what is found and of what is expected; none where nothing expected is shown."""
 
     @property
     def account(self) -> dict[str, Any]:
-        """What a trained model remembers of it, and the metrics that it is to use."""
-        return super().account | {"sound_metric": list(self.sound_metric), "pose_metric": list(self.pose_metric)}
+        """What a trained model remembers of it, and the metrics and shares that it is to use."""
+        lists = {"sound_metric": list(self.sound_metric), "pose_metric": list(self.pose_metric)}
+        return super().account | lists | {"shares": [list(share) for share in self.shares]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +107,14 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
     logs = logs_of(model)
     errors = descend(logs, mean_error, examples, others, seed=seed, rounds=rounds, pull=pull)
     learned = _learned(model, logs, errors)
+    model = model.with_weights(**learned.settings, sharpening=0.0, residual=0.0)
+    model.count_by(learned.sound_metric, learned.pose_metric)
+    if settings.get("expected_share", 0) > 0:
+        count = sum(len(part) for part in held_out)
+        learned = replace(learned, shares=learned_shares(model, track(chain(*held_out), "shares of components", count)))
+        model.show(learned.shares)
     if settings.get("sharpening", 0) > 0:
-        learned.settings["sharpening"] = _sharpening(model, learned, held_out[1], settings.get("residual", 0.0))
+        learned.settings["sharpening"] = _sharpening(model, held_out[1], settings.get("residual", 0.0))
     return learned
 
 
@@ -192,10 +203,8 @@ def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetr
     return LearnedMetrics(settings, errors, tuple(logs.factor("sound").tolist()), tuple(logs.factor("pose").tolist()))
 
 
-def _sharpening(model: Efase, learned: LearnedMetrics, held_out: Corpus, residual: float) -> float:
+def _sharpening(model: Efase, held_out: Corpus, residual: float) -> float:
     """What the model needs, as it has been learned, to move as quickly as the recordings of sentences it does not know."""
-    model = model.with_weights(**learned.settings, sharpening=0.0, residual=0.0)
-    model.count_by(learned.sound_metric, learned.pose_metric)
     fps = model.config["database_fps"]
     pairs = [(model.synthesize(u.speech, fps=fps), resample(u.motion, fps)) for u in track(held_out, "sharpening", len(held_out))]
     points = lip_points(held_out.layout) if residual > 0 else None  # the rest of the face gets its movement otherwise

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from facesynth.corpus import Corpus
 from facesynth.corpus.journal import Edits
-from facesynth.inference.arrays import Ints
+from facesynth.inference.arrays import Floats, Ints
 from facesynth.inference.efase.assembly import Smoothing
 from facesynth.inference.efase.bounds import TABLES, step_bounds
 from facesynth.inference.efase.changed_bounds import changed_bounds
@@ -59,8 +59,9 @@ class Efase(Method):
     path counts by exp(-cost / temperature) and a phone is the mean of the `candidates` nodes that may stand there
     (see `soft`): nearer to the truth on average, with less motion. `audio_weight` and `pose_weight` let the sound
     speak in the target cost (see `audio`), `expected_share` is how much of the pose that is shown is the expected one in place
-    of the search's (0..1), `sharpening` raises quick movement (see `sharpening`), `residual` is how much is
-    added of what recorded faces do beside their lips (see `inference.residual`); 0 in the paper.
+    of the search's (0..1; with `learn`, where shares of each component start, see `shares`), `sharpening` raises quick movement
+    (see `sharpening`), `residual` is how much is added of what recorded faces do beside their lips (see `inference.residual`);
+    0 in the paper.
 
     With `learn`, training starts from these weights and learns all that are above 0 on sentences of the corpus that it
     keeps out of the database meanwhile (see `learning`) before it fits with what it found. With `maps`, the Isomap of each
@@ -129,7 +130,7 @@ class Efase(Method):
 
     @classmethod
     def prepared(cls, config: Mapping[str, Any], corpus: Corpus, seed: int) -> Prepared:
-        """With `learn`, the weights learned on sentences held out; the account has the metrics of sound and pose as well."""
+        """With `learn`, the weights learned on sentences held out; the account has the metrics and shares as well."""
         if not config["learn"]:
             return Prepared(config)
         from facesynth.methods.efase.learning import learn  # it trains this class on a part of the corpus
@@ -139,14 +140,26 @@ class Efase(Method):
 
     def remember(self, account: Mapping[str, Any]) -> None:
         """Keep what was learned, and let the components of sound and pose count as it says."""
-        super().remember({key: value for key, value in account.items() if key not in METRICS})
+        super().remember({key: value for key, value in account.items() if key not in (*METRICS, "shares")})
         if account:
             self.count_by(*(account[metric] for metric in METRICS))
+            self.show(account["shares"])
 
     def count_by(self, sound: Sequence[float], pose: Sequence[float]) -> None:
         """Let the squared differences of each component of the sound and of the pose count by these factors."""
         self.audio.count_by(sound, pose)
         self._speaker = self._edited = None
+
+    def show(self, shares: Sequence[Sequence[float]]) -> None:
+        """Of each component [2, D] so much of what the search finds and of what is expected; none: `expected_share` says it."""
+        self.register_buffer("component_shares", torch.tensor(shares, dtype=torch.float32))
+        self._speaker = self._edited = None
+
+    @property
+    def shares(self) -> Floats | None:
+        """[2, D] what `show` was told; None where `expected_share` says it."""
+        shares: Tensor | None = getattr(self, "component_shares", None)
+        return shares.cpu().double().numpy() if shares is not None and shares.numel() else None
 
     def fit(self, corpus: Corpus, *, seed: int = 0) -> Self:
         """Cut the corpus into nodes and prepare the search; `seed` picks the pairs that PNT is scaled by."""
@@ -229,6 +242,7 @@ class Efase(Method):
                     hearing=self.audio.heard_by(nodes, self.audio_weights()),
                     **self._search(),
                     residual=self.residual.motion(self.fps, self.config["residual"]) if self.residual else None,
+                    shares=self.shares,
                 )
             )
         return self._speaker
@@ -314,7 +328,7 @@ class Efase(Method):
         return self.speaker.joins(speech)
 
     def with_weights(self, **weights: float) -> Self:
-        """The same database under other parameters of the cost, sharing its arrays."""
+        """The same database under other parameters of the cost, sharing its arrays; another `expected_share` is that of all."""
         other = self._sharing(weights)
         for name in ("node_frames", "node_table", "map_points"):
             if hasattr(self, name):
@@ -356,6 +370,8 @@ class Efase(Method):
         other.layout, other.fps, other.emotions = self.layout, self.fps, self.emotions
         other.facts, other.provenance, other.pca = dict(self.facts), self.provenance, self.pca
         other.register_buffer("rest", self.rest)
+        if self.shares is not None and "expected_share" not in weights:
+            other.register_buffer("component_shares", self.get_buffer("component_shares"))
         return other
 
     def _keep_bounds(self) -> None:
