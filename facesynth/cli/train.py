@@ -14,6 +14,8 @@ from facesynth.cli.types import FILE
 from facesynth.inference.errors import FacesynthError, unknown
 
 if TYPE_CHECKING:
+    import torch
+
     from facesynth.corpus import Corpus
     from facesynth.corpus.workers import Workers
     from facesynth.methods.method import Method
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 @click.option("--emotion", "only", help="Learn from recordings of this emotion alone; all otherwise.")
 @click.option("--device", help="auto (the default), cpu, cuda or mps; `device` of --config otherwise.")
 @seeded
-@spread_over("--jobs", 1, "METHOD emotion: voices at once; 1 otherwise.")
+@spread_over("--jobs", 1, "Independent pieces of learning at once; 1 otherwise.")
 @as_json
 def train(
     *,
@@ -48,14 +50,17 @@ def train(
     """Train METHOD on CORPUS and write one model file; without METHOD, what is nearest to recordings, as it is nearest.
 
     METHOD `emotion` makes a detector of emotions in the voice; it also learns from a CSV of sound files
-    (file,emotion,speaker,sentence), and extracts the voices' features by --jobs or --engine. The others listen as they
-    learn, a two-hundredth of a second to a recording, in one process.
+    (file,emotion,speaker,sentence). By --jobs or --engine are spread what is heard in each recording, the searches that
+    weights are learned from, the folds that numbers of states are chosen by, and emotion maps; networks learn in one process.
+    The model is the same, to the byte.
 
     A method that takes key shapes by hand makes a model of a CSV (phones, a column for each channel of the rig) in place
     of CORPUS, or of one that comes with facesynth, by its name (`arkit`): nothing is recorded for it.
     """
     from facesynth.config import load_config, parse_settings
+    from facesynth.corpus.workers import ALONE
     from facesynth.device import device_of
+    from facesynth.methods.learn.spreading import working
     from facesynth.methods.registry import method_class, of_table
     from facesynth.methods.training import train as learn
     from facesynth.stage.speaker_pictures import save_face
@@ -71,7 +76,6 @@ def train(
 
         train_detector(corpus, chosen, path, seed if split == "train" else None, workers=workers, as_json=as_json)
         return
-    _require_alone(method, workers)
     if (made := of_table(method, str(corpus), chosen)) is not None:
         made.save(path)
         _tell_made(path, method, len(made.fitted_layout.names), as_json=as_json)
@@ -79,9 +83,12 @@ def train(
     method_class(method).from_config(chosen)  # a wrong setting is told before a corpus is read
     recordings = _recordings(corpus, seed if split == "train" else None, only)
     start = time.perf_counter()
-    model = learn(method_class(method), recordings, chosen, seed=seed, device=place)
+    with working(workers) as team:
+        model = learn(method_class(method), recordings, chosen, seed=seed, device=_for_workers(place, workers))
     seconds = time.perf_counter() - start
     model.save(path)
+    if workers != ALONE and not team.pieces:
+        click.echo(f"warning: {method} learned in one process: nothing of it consists of independent pieces", err=True)
     _tell_learned(model, recordings, path, save_face(recordings, path), seconds, as_json=as_json)
 
 
@@ -159,13 +166,13 @@ def _left_out(found: Mapping[str, Any]) -> dict[str, Any]:
     return facts
 
 
-def _require_alone(method: str, workers: Workers) -> None:
+def _for_workers(place: torch.device, workers: Workers) -> torch.device:
+    """The device, which several processes cannot share."""
     from facesynth.corpus.workers import ALONE
 
-    if workers != ALONE:
-        raise FacesynthError(
-            f"{method} learns in one process; --jobs and --engine are for `train emotion` and `facesynth corpus`"
-        )
+    if workers != ALONE and place.type != "cpu":
+        raise FacesynthError(f"--jobs and --engine spread what the processor does; got the device {place}: give --device cpu")
+    return place
 
 
 def _require_speech(recordings: Corpus) -> None:

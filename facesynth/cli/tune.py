@@ -40,7 +40,8 @@ def tune(
 ) -> None:
     """Search a method's settings on held-out sentences of every CORPUS together; interrupted, it goes on where it was.
 
-    What is found is nearest over all of them, each counting alike, and is tested on other sentences of each.
+    What is found is nearest over all of them, each counting alike and a loss on one ten times; it is tested on other
+    sentences of each. What is 3 % farther on one CORPUS than the settings that trials start from is not tried on the next.
     """
     import yaml
 
@@ -59,7 +60,8 @@ def tune(
 
 
 def _results(found: Any, count: int) -> Iterator[str]:
-    yield f"on these sentences its error is {found.ratio:.4f} of that of the published settings"
+    ratios = ", ".join(f"{performer} {ratio:.4f}" for performer, ratio in found.ratios.items())
+    yield f"error on these sentences over that of the settings it started from: {ratios}"
     yield f"on {count} other sentences of each, mean squared error:\n"
     yield "| corpus | found | default | published | found nearer than default |\n|---|---:|---:|---:|---:|"
     for one in found.tested:

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -9,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import redirect_stdout
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, Literal, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -85,11 +86,24 @@ def _persistent(function: Callable[[Item], Result], items: Sequence[Item], jobs:
 
 def _pooled(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
     context = multiprocessing.get_context("spawn")
+    work = partial(_on_bytes, pickle.dumps(function))
     with ProcessPoolExecutor(min(jobs, len(items)), context, initializer=_end_with_parent) as pool:
         try:
-            yield from pool.map(function, items)
+            yield from map(pickle.loads, pool.map(work, map(pickle.dumps, items)))
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _on_bytes(function: bytes, item: bytes) -> bytes:
+    """Everything travels as bytes: tensors would otherwise be handed over as open files, one for each of thousands."""
+    return pickle.dumps(_unpacked(function)(pickle.loads(item)))  # noqa: S301 - from the parent process
+
+
+@lru_cache(maxsize=1)
+def _unpacked(function: bytes) -> Callable[[Any], Any]:
+    """Once in each worker, for a function may bring a model along."""
+    found: Callable[[Any], Any] = pickle.loads(function)  # noqa: S301 - from the parent process
+    return found
 
 
 def _end_with_parent() -> None:

@@ -20,12 +20,17 @@ REACH = 10
 """Half length of the filter in periods of the lower rate."""
 
 
+def resampled_length(samples: int, rate: int, new_rate: int) -> int:
+    """How many samples `resample` makes of so many."""
+    return -(-samples * new_rate // rate)
+
+
 def resample(audio: NDArray[Any], rate: int, new_rate: int) -> NDArray[np.float32]:
     """The same sound [S] at another rate in Hz, band-limited: a polyphase filter of 20 periods of the lower rate."""
     rate, new_rate, audio = checked_hz(rate), checked_hz(new_rate), checked_piece(audio)
     if rate == new_rate:
         return audio
-    count, around = -(-len(audio) * new_rate // rate), REACH * max(1, -(-rate // new_rate)) + 2
+    count, around = resampled_length(len(audio), rate, new_rate), REACH * max(1, -(-rate // new_rate)) + 2
     parts = Growing()
     for start in range(0, max(1, count), BLOCK):  # sums in float64 of the whole would be four times as large as the sound
         stop = min(start + BLOCK, count)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -22,11 +23,12 @@ from facesynth.inference.anime_graph.candidates import stretched_motions
 from facesynth.inference.anime_graph.plan import lay_steps
 from facesynth.inference.anime_graph.search import Weights, step_terms
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.learn.sharpening import matching_share
+from facesynth.methods.learn.spreading import in_pieces
 from facesynth.motion.search.posterior import posterior
 from facesynth.motion.search.steps import GivenSteps
-from facesynth.progress import track
 
 if TYPE_CHECKING:
     from facesynth.methods.anime_graph.method import AnimeGraph
@@ -65,17 +67,17 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
         raise FacesynthError("learning goes through the mean over paths; give a temperature above 0 (2 is a start)")
     graph, *held_out = three_parts(corpus, seed)
     model = AnimeGraph.from_config(settings).fit(graph, seed=seed)
-    runtime = model.runtime()
-    examples, others = ([lattice_of(model, u) for u in track(part, "lattices", len(part))] for part in held_out)
+    ids, count = [number for part in held_out for number in part.ids], len(held_out[0])
+    lattices = list(in_pieces(partial(_lattice, model, corpus), ids, "lattices"))
+    examples, others = lattices[:count], lattices[count:]
     logs, temperature = Logs({name: model.config[name] for name in NUMBERS}, {}), model.config["temperature"]
     errors = descend(
         logs, lambda some, numbers: mean_error(some, numbers, temperature), examples, others, seed=seed, rounds=rounds, pull=pull
     )
     found = logs.found()
     if model.config["sharpening"] > 0:
-        runtime = replace(runtime, weights=Weights(*(found[name] for name in NUMBERS)), sharpening=0.0)
-        pairs = [(runtime.synthesize(u.speech), u.motion) for u in track(held_out[1], "sharpening", len(held_out[1]))]
-        found["sharpening"] = matching_share(pairs)
+        say = partial(_made_and_recorded, model, Weights(*(found[name] for name in NUMBERS)), held_out[1])
+        found["sharpening"] = matching_share(list(in_pieces(say, held_out[1].ids, "sharpening")))
     return Learned(found, errors)
 
 
@@ -92,6 +94,16 @@ def mean_error(lattices: Sequence[Lattice], logs: Logs, temperature: float) -> T
         error, frames = squared_error(torch.cat(means), lattice.truth)
         total, count = total + error, count + frames
     return total / max(count, 1)
+
+
+def _lattice(model: AnimeGraph, corpus: Corpus, number: str) -> Lattice:
+    return lattice_of(model, corpus[number])
+
+
+def _made_and_recorded(model: AnimeGraph, weights: Weights, corpus: Corpus, number: str) -> tuple[Motion, Motion]:
+    """What the model makes of a recorded speech by these weights, not sharpened, and the recording."""
+    utterance = corpus[number]
+    return replace(model.runtime(), weights=weights, sharpening=0.0).synthesize(utterance.speech), utterance.motion
 
 
 def lattice_of(model: AnimeGraph, utterance: Utterance) -> Lattice:

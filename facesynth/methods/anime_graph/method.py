@@ -1,6 +1,7 @@
 """The anime graph as a method of the zoo."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import permutations
 from typing import Any, Self
 
@@ -32,8 +33,8 @@ from facesynth.methods.anime_graph.features import AudioFeatures
 from facesynth.methods.anime_graph.learning import learn
 from facesynth.methods.anime_graph.lowpass import cutoffs_hz
 from facesynth.methods.anime_graph.mapping import (
+    EmotionMap,
     MapSettings,
-    Samples,
     Width,
     fit_emotion_map,
     matched,
@@ -46,6 +47,7 @@ from facesynth.methods.anime_graph.torch_search import torch_search
 from facesynth.methods.capabilities import Account
 from facesynth.methods.learn.expectation import PosePredictor
 from facesynth.methods.learn.hearing import Features
+from facesynth.methods.learn.spreading import in_pieces
 from facesynth.methods.method import Method, Prepared
 from facesynth.methods.registry import register
 from facesynth.motion.rbf import Kernel
@@ -175,24 +177,27 @@ class AnimeGraph(Method):
     @threadpool_limits.wrap(limits=1)
     def _fit_maps(self, takes: Sequence[Take], seed: int) -> None:
         """A map for every ordered pair of emotions; why there is none is kept for those who ask for it."""
-        self.facts["no_map"], fitted = {}, []
+        self.facts["no_map"] = {}
         pairs = list(permutations(self.emotions, 2))
         counts = {pair: len({a.sentence for a, _ in emotion_pairs(takes, *pair)}) for pair in pairs}
         self.split = self._split(takes, seed) if any(counts.values()) else NOTHING_SPLIT
         self.facts["findings"] = [self.split.summary()] if len(self.emotions) > 1 else []
-        for pair in track(pairs, "emotion maps"):
+        fitted = []
+        for pair in pairs:
             try:
                 require_pairs(self.split, counts[pair], *pair)
             except FacesynthError as error:
                 self.facts["no_map"][" ".join(pair)] = str(error)
             else:
-                fitted.append(self._fit_map(matched(emotion_pairs(takes, *pair), self.split), pair, seed))
-        self.maps.fill(fitted, self.split.emotional)
+                fitted.append(pair)
+        mixing = self.components.mixing.numpy()
+        fit = partial(_fit_map, list(takes), self.split, self.map_settings, mixing, seed)
+        found = zip(fitted, in_pieces(fit, fitted, "emotion maps"), strict=True)
+        self.maps.fill([FittedMap(*map(self.emotions.index, pair), *one) for pair, one in found], self.split.emotional)
 
-    def _fit_map(self, samples: Sequence[Samples], pair: tuple[str, str], seed: int) -> FittedMap:
-        source, target = map(self.emotions.index, pair)
-        found = fit_emotion_map(samples, self.split, self.map_settings, self.components.mixing.numpy(), seed=seed)
-        return FittedMap(source, target, *found)
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process, without what is made anew when it is asked for."""
+        return {**self.__dict__, "_chooser": None, "_last": LastSearch()}
 
     def _split(self, takes: Sequence[Take], seed: int) -> Split:
         override = self.config["emotional_components"]
@@ -291,3 +296,9 @@ class AnimeGraph(Method):
     def stream(self, wishes: Iterable[Wish], *, look_ahead: int = 4) -> Iterator[NDArray[np.float32]]:
         """Frames [n, C] while phones arrive, as `open_stream` gives them."""
         return self.runtime().stream_wishes(wishes, look_ahead=look_ahead)
+
+
+def _fit_map(
+    takes: list[Take], split: Split, settings: MapSettings, mixing: Floats, seed: int, pair: tuple[str, str]
+) -> EmotionMap:
+    return fit_emotion_map(matched(emotion_pairs(takes, *pair), split), split, settings, mixing, seed=seed)

@@ -9,6 +9,7 @@ quickly as they do.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from itertools import chain, pairwise
 from typing import Any
 
@@ -24,6 +25,7 @@ from facesynth.inference.efase.plan import stretches
 from facesynth.inference.efase.soft import candidates
 from facesynth.inference.efase.steps import StepTerms, step_terms
 from facesynth.inference.errors import FacesynthError
+from facesynth.inference.motion import Motion
 from facesynth.inference.warp import stretched
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.penalty import median_transition
@@ -31,6 +33,7 @@ from facesynth.methods.efase.shares import learned_shares
 from facesynth.methods.learn.descent import Learned, Logs, descend, squared_error, three_parts, with_gaps
 from facesynth.methods.learn.point_loss import lip_points
 from facesynth.methods.learn.sharpening import matching_share
+from facesynth.methods.learn.spreading import in_pieces
 from facesynth.motion.resample import resample
 from facesynth.motion.search.posterior import posterior
 from facesynth.motion.search.steps import GivenSteps
@@ -103,7 +106,9 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
         raise FacesynthError("learning goes through the soft search; give a temperature above 0 (0.3 is a start)")
     database, *held_out = three_parts(corpus, seed)
     model = Efase.from_config({**settings, "learn": False}).fit(database, seed=seed)
-    examples, others = ([x for u in track(part, "lattices", len(part)) for x in lattices_of(model, u)] for part in held_out)
+    ids, count = [number for part in held_out for number in part.ids], len(held_out[0])
+    made = list(in_pieces(partial(_lattices, model, corpus), ids, "lattices"))
+    examples, others = ([x for some in part for x in some] for part in (made[:count], made[count:]))
     logs = logs_of(model)
     errors = descend(logs, mean_error, examples, others, seed=seed, rounds=rounds, pull=pull)
     learned = _learned(model, logs, errors)
@@ -145,6 +150,10 @@ def lattices_of(model: Efase, utterance: Utterance) -> list[Lattice]:
             )
         )
     return made
+
+
+def _lattices(model: Efase, corpus: Corpus, number: str) -> list[Lattice]:
+    return lattices_of(model, corpus[number])
 
 
 def mean_error(lattices: Sequence[Lattice], logs: Logs) -> Tensor:
@@ -205,7 +214,12 @@ def _learned(model: Efase, logs: Logs, errors: tuple[float, ...]) -> LearnedMetr
 
 def _sharpening(model: Efase, held_out: Corpus, residual: float) -> float:
     """What the model needs, as it has been learned, to move as quickly as the recordings of sentences it does not know."""
-    fps = model.config["database_fps"]
-    pairs = [(model.synthesize(u.speech, fps=fps), resample(u.motion, fps)) for u in track(held_out, "sharpening", len(held_out))]
+    pairs = list(in_pieces(partial(_made_and_recorded, model, held_out), held_out.ids, "sharpening"))
     points = lip_points(held_out.layout) if residual > 0 else None  # the rest of the face gets its movement otherwise
     return matching_share(pairs, points)
+
+
+def _made_and_recorded(model: Efase, corpus: Corpus, number: str) -> tuple[Motion, Motion]:
+    """What the model makes of a recorded speech, and the recording, both at the database's rate."""
+    utterance, fps = corpus[number], model.config["database_fps"]
+    return model.synthesize(utterance.speech, fps=fps), resample(utterance.motion, fps)

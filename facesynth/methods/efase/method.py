@@ -395,6 +395,10 @@ class Efase(Method):
         frames: NDArray[np.float32] = self.pca.decode(torch.from_numpy(coordinates).to(self.pca.mean.device)).cpu().numpy()
         return frames
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process, without what is made anew when it is asked for."""
+        return {**self.__dict__, "_speaker": None, "_edited": None}
+
     def _apply(self, fn: Any, recurse: bool = True) -> Self:
         """Arrays that move to another device are read anew."""
         self._speaker = self._edited = None

@@ -2,8 +2,10 @@
 
 The error is piecewise constant in the parameters (the path changes or it does not), so there is no
 gradient: a tree-structured Parzen estimator (Optuna) over the logarithms of PNT and of the six weights, begun
-with the published ones. What is found on one performer need not suit another, so several corpora are searched
-together: of each the error counts relative to that of the published parameters, as a geometric mean.
+with those that the models have and the published ones, each also with a high price of another emotion. What is found on one
+performer need not suit another, so several corpora are searched together. Of each the error counts relative to that of the
+models' own settings: their geometric mean is made least, and what is lost on any corpus weighs LOSS times as much. What is
+HOPELESS on one corpus is not tried on the next, so the cheapest corpus is best named first.
 
 Trials are asked for in groups, so that what is found does not depend on who evaluates them. Every evaluation is
 kept in a file; a search that was interrupted and is started again with the same seed asks for the same trials, takes
@@ -23,30 +25,36 @@ import optuna
 
 from facesynth.corpus import Corpus, Record
 from facesynth.corpus.workers import ALONE, Workers, spread
-from facesynth.inference.arrays import Floats
 from facesynth.inference.errors import FacesynthError
 from facesynth.methods.efase.method import Efase
 from facesynth.methods.efase.tuning_journal import TuningJournal
 from facesynth.methods.efase.tuning_search import ChangingSettings, Example, examples_of, sentence_errors
 
 RANGES: dict[str, tuple[float, float]] = {
-    "penalty": (5.0, 100.0),
+    "penalty": (1.0, 100.0),
     "alpha": (0.3, 30.0),
     "beta": (0.05, 50.0),
     "eta": (0.05, 50.0),
     "gamma": (0.03, 1.0),
-    "delta": (0.03, 3.0),
-    "phi": (0.01, 1.0),
+    "delta": (0.03, 10.0),
+    "phi": (0.01, 10.0),
 }
 """Where each setting of the search is looked for; all are searched by their logarithm."""
 SOFT_RANGES: dict[str, tuple[float, float]] = {
     "temperature": (0.03, 10.0),
     "audio_weight": (0.03, 30.0),
     "pose_weight": (0.03, 30.0),
+    "expected_share": (0.1, 0.9),
 }
 """The same of what the paper leaves at 0; searched where a model has it."""
+APART = 1.0
+"""A price of another emotion, phi, at which it costs as much as a step that no rule likes."""
 PUBLISHED = {"alpha": 3.6052, "beta": 5.7814, "eta": 6.8282, "gamma": 0.2903, "delta": 0.315, "phi": 0.109, "penalty": 10.0}
 """Deng 2006; PNT is ours, the dissertation gives none."""
+LOSS = 10.0
+"""A loss of a hundredth on one corpus outweighs a gain of a tenth over all."""
+HOPELESS = 1.03
+"""A ratio of errors on one corpus for which no gain on others makes up."""
 CROWD = 4
 """Trials of a group for each setting."""
 
@@ -91,8 +99,8 @@ class Tuning:
     """What a search found."""
 
     settings: dict[str, float]
-    ratio: float
-    """On the tuning sentences: error over that of the published settings, geometric mean over the corpora."""
+    ratios: dict[str, float]
+    """On the tuning sentences: error over that of the models' own settings, by performer."""
     evaluations: int
     tuning_sentences: tuple[tuple[str, ...], ...]
     """Of each corpus."""
@@ -146,34 +154,67 @@ def tune(
     """Find settings that are nearest over all `recordings`.
 
     `generations` groups of trials, CROWD for each setting, follow the first one, which is drawn at random but for the
-    published settings. journal: a file of JSON lines, one for each evaluation, which makes the search resumable; it belongs
-    to these models and this seed.
+    models' own and the published settings. journal: a file of JSON lines, one for each evaluation, which makes the search
+    resumable; it belongs to these models and this seed.
     """
-    ranges = _ranges(_loaded(recordings[0].model))
-    kept = TuningJournal(Path(journal), _about(recordings, seed))
-    published = _errors(recordings, [PUBLISHED], kept, workers, "published settings")[0]
-    study = _study(seed, CROWD * len(ranges))
+    model = _loaded(recordings[0].model)
+    ranges, kept = _ranges(model), TuningJournal(Path(journal), _about(recordings, seed))
+    own = {name: float(model.config[name]) for name in ranges}
+    start = [_errors(of, [own], kept, workers, f"the models' own settings, {of.performer}")[0] for of in recordings]
+    study = _study(seed, CROWD * len(ranges), _within(ranges, own))
     for group in range(generations + 1):
         trials = [study.ask() for _ in range(CROWD * len(ranges))]
         settings = [{name: trial.suggest_float(name, *ranges[name], log=True) for name in ranges} for trial in trials]
-        errors = _errors(recordings, settings, kept, workers, f"tuning, group {group + 1} of {generations + 1}")
-        for trial, row in zip(trials, errors, strict=True):
-            study.tell(trial, float(np.log(row / published).mean()))
+        rows = _ratios(recordings, settings, start, kept, workers, f"tuning, group {group + 1} of {generations + 1}")
+        for trial, ratios in zip(trials, rows, strict=True):
+            study.tell(trial, _standing(ratios))
+    found = study.best_params
+    best = _ratios(recordings, [found], start, kept, workers, "what was found")[0]
     return Tuning(
-        study.best_params,
-        float(np.exp(study.best_value)),
+        found,
+        {of.performer: ratio for of, ratio in zip(recordings, best, strict=False)},
         len(study.trials),
         tuple(one.tuning for one in recordings),
-        tuple(_tested(recordings, study.best_params, workers)),
+        tuple(_tested(recordings, found, workers)),
     )
 
 
-def _study(seed: int, group: int) -> optuna.Study:
-    """A search that begins with the published settings; Optuna tells of a study only what goes wrong."""
+def _standing(ratios: Sequence[float]) -> float:
+    """What the search makes least: the mean of the logarithms, and LOSS times the largest of them where that is a loss."""
+    logs = np.log(ratios)
+    return float(logs.mean() + LOSS * max(logs.max(), 0.0))
+
+
+def _ratios(
+    recordings: Sequence[Recordings],
+    settings: Sequence[Mapping[str, float]],
+    start: Sequence[float],
+    kept: TuningJournal,
+    workers: Workers,
+    what: str,
+) -> list[list[float]]:
+    """Of each of the settings, errors over those of the `start` by corpus, up to the first on which they are HOPELESS."""
+    ratios: list[list[float]] = [[] for _ in settings]
+    for of, least in zip(recordings, start, strict=True):
+        going = [number for number, row in enumerate(ratios) if max(row, default=1.0) <= HOPELESS]
+        errors = _errors(of, [settings[number] for number in going], kept, workers, f"{what}, {of.performer}")
+        for number, error in zip(going, errors, strict=True):
+            ratios[number].append(error / least)
+    return ratios
+
+
+def _study(seed: int, group: int, own: Mapping[str, float]) -> optuna.Study:
+    """A search that begins with what is known, and with that where emotions are kept apart; it tells only what goes wrong."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(sampler=optuna.samplers.TPESampler(n_startup_trials=group, seed=seed))
-    study.enqueue_trial(PUBLISHED)
+    for known in (own, PUBLISHED):
+        study.enqueue_trial(dict(known))
+        study.enqueue_trial({**known, "phi": APART})
     return study
+
+
+def _within(ranges: Mapping[str, tuple[float, float]], settings: Mapping[str, float]) -> dict[str, float]:
+    return {name: float(np.clip(settings[name], *limits)) for name, limits in ranges.items()}
 
 
 def _ranges(model: Efase) -> dict[str, tuple[float, float]]:
@@ -192,15 +233,15 @@ def _about(recordings: Sequence[Recordings], seed: int) -> dict[str, Any]:
 
 
 def _errors(
-    recordings: Sequence[Recordings], settings: Sequence[Mapping[str, float]], kept: TuningJournal, workers: Workers, what: str
-) -> list[Floats]:
-    """[corpora] mean errors for each of the settings; what the journal knows is not computed again."""
+    of: Recordings, settings: Sequence[Mapping[str, float]], kept: TuningJournal, workers: Workers, what: str
+) -> list[float]:
+    """The mean error on a corpus of each of the settings; what the journal knows is not computed again."""
     rows = [tuple(one.items()) for one in settings]
-    missing = [(row, of) for row in dict.fromkeys(rows) for of in recordings if not kept.knows(row, of.performer)]
-    jobs = [Job(row, of, of.tuning) for row, of in missing]
-    for (row, of), errors in zip(missing, spread(errors_of, jobs, workers, what), strict=True):
+    missing = [row for row in dict.fromkeys(rows) if not kept.knows(row, of.performer)]
+    jobs = [Job(row, of, of.tuning) for row in missing]
+    for row, errors in zip(missing, spread(errors_of, jobs, workers, what), strict=True):
         kept.keep(row, of.performer, float(np.mean(errors)))
-    return [np.array([kept.error(row, of.performer) for of in recordings]) for row in rows]
+    return [kept.error(row, of.performer) for row in rows]
 
 
 def _tested(recordings: Sequence[Recordings], found: Mapping[str, float], workers: Workers) -> Iterator[ErrorsOnOthers]:

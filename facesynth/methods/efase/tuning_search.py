@@ -1,8 +1,9 @@
 """One model under many settings of its cost, on the same sentences: what does not depend on the settings is computed once.
 
 TC is linear in the weights, and so are both terms of what is heard: the bending, the jumps and the distances between
-all nodes are kept as tables, and a search is a sum of tables and a plain Viterbi recursion over all nodes. Tables take
-the square of the number of nodes; a database that is too large for them is searched as any other.
+all nodes are kept as tables, and a search is a sum of tables and a plain Viterbi recursion over all nodes, which reads the
+whole table at each phone and therefore keeps it in single precision. Tables take the square of the number of nodes; a
+database that is too large for them is searched as any other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from facesynth.corpus import Corpus, Utterance
 from facesynth.inference.arrays import Floats, Ints
@@ -58,7 +60,7 @@ def sentence_errors(speaker: Speaker, examples: Sequence[Example]) -> list[float
 
 
 class ChangingSettings:
-    """A model whose weights, temperature and penalty change from one search to the next."""
+    """A model whose weights, temperature, penalty and share of the expected pose change from one search to the next."""
 
     def __init__(self, model: Efase) -> None:
         self.model, self._hearing = model, None
@@ -82,7 +84,9 @@ class ChangingSettings:
             replace(
                 parts,
                 weights=weights,
-                settings=replace(parts.settings, temperature=config["temperature"] * unit),
+                settings=replace(
+                    parts.settings, temperature=config["temperature"] * unit, expected_share=config["expected_share"]
+                ),
                 hearing=hearing,
                 engine=steps.cheapest_path,
                 step_matrix=steps.between,
@@ -94,12 +98,13 @@ class ChangingSettings:
 class _Steps:
     """TC of all steps under some weights."""
 
-    into: Floats
+    into: NDArray[np.float32]
     """[N, N] of steps to each node (rows) from each node (columns)."""
 
     def cheapest_path(self, targets: Floats) -> Ints:
         """[T] the nodes of the least cost under target costs [T, N]: Viterbi's recursion, ties to the lowest node."""
-        cost, came_from, total = targets[0], [], np.empty_like(self.into)
+        targets, came_from, total = targets.astype(self.into.dtype), [], np.empty_like(self.into)
+        cost = targets[0]
         for target in targets[1:]:
             best = np.add(self.into, cost, out=total).argmin(axis=1)
             came_from.append(best)
@@ -111,7 +116,7 @@ class _Steps:
 
     def between(self, nodes: Nodes, before: Ints, after: Ints, weights: Weights) -> Floats:
         """[n, m] of the steps from the nodes `before` to the nodes `after`, as `step_matrix` computes them."""
-        return self.into[np.ix_(after, before)].T
+        return self.into[np.ix_(after, before)].T.astype(np.float64)
 
 
 class _StepTables:
@@ -126,7 +131,7 @@ class _StepTables:
         self._before, self._after = alike_pairs(nodes)
 
     def under(self, weights: Weights) -> _Steps:
-        return _Steps(np.asarray(self._terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta)))
+        return _Steps(np.asarray(self._terms.cost(weights.pnt, weights.alpha, weights.beta, weights.eta), np.float32))
 
     def median(self, weights: Weights) -> float:
         """See `median_transition`."""

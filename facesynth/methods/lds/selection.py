@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ from facesynth.methods.lds.deterministic import fit_inputs, observability, shift
 from facesynth.methods.lds.identification import fitting_rows
 from facesynth.methods.lds.stochastic import noise_rows, predictor_space, realise
 from facesynth.methods.lds.system import Array, Clip, Deterministic
-from facesynth.progress import track
+from facesynth.methods.learn.spreading import in_pieces
 
 FOLDS = 4
 MOST_FRAMES = 6_000
@@ -35,6 +36,15 @@ class Fold:
     test: tuple[Clip, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Numbers of states that are tried on one fold."""
+
+    fold: Fold
+    rows: int
+    orders: tuple[int, ...]
+
+
 def folds(clips: Sequence[Clip], sentences: Sequence[str], rows: int) -> list[Fold]:
     """Up to four folds by sentence; a recording with fewer sentences than two is cut in time."""
     clips, sentences = _thinned(clips, sentences)
@@ -57,13 +67,16 @@ def deterministic_errors(parts: Sequence[Fold], rows: int, orders: Sequence[int]
 
     `weights` [p] are the squared scales of the shape's components.
     """
+    trials = [Trial(fold, rows, tuple(orders)) for fold in parts]
+    return np.concatenate(list(in_pieces(partial(_deterministic_errors, weights), trials, "numbers of states")), axis=1)
 
-    def judge(fold: Fold) -> Array:
-        gamma, _ = observability(fold.train, rows)
-        models = [_deterministic(fold.train, gamma, order) for order in orders]
-        return np.array([[_mean_square(c.y - model.simulate(c.u), weights) for c in fold.test] for model in models])
 
-    return np.concatenate([judge(fold) for fold in parts], axis=1)
+def _deterministic_errors(weights: Array, trial: Trial) -> Array:
+    """[orders, held-out clips]"""
+    fold = trial.fold
+    gamma, _ = observability(fold.train, trial.rows)
+    models = [_deterministic(fold.train, gamma, order) for order in trial.orders]
+    return np.array([[_mean_square(c.y - model.simulate(c.u), weights) for c in fold.test] for model in models])
 
 
 def stochastic_errors(parts: Sequence[Fold], rows: int, order: int, orders: Sequence[int], weights: Array) -> Array:
@@ -71,18 +84,21 @@ def stochastic_errors(parts: Sequence[Fold], rows: int, order: int, orders: Sequ
 
     The first `rows` frames of a clip do not count, while the predictor does not know the clip yet.
     """
+    trials = [Trial(fold, rows, tuple(orders)) for fold in parts]
+    return np.concatenate(list(in_pieces(partial(_stochastic_errors, order, weights), trials, "states of the noise")), axis=1)
 
-    def judge(fold: Fold) -> Array:
-        gamma, _ = observability(fold.train, rows)
-        model = _deterministic(fold.train, gamma, order)
-        past = noise_rows(sum(len(clip.y) for clip in fold.train), rows, fold.train[0].y.shape[1])
-        rest = [clip.y - model.simulate(clip.u) for clip in fold.train]
-        functionals, _ = predictor_space(rest, past)
-        noises = [realise(rest, past, functionals, candidate)[0] for candidate in orders]
-        left = [(clip.y - model.simulate(clip.u))[:, :, None] for clip in fold.test]
-        return np.array([[_mean_square(noise.innovations(y)[0][rows:, :, 0], weights) for y in left] for noise in noises])
 
-    return np.concatenate([judge(fold) for fold in parts], axis=1)
+def _stochastic_errors(order: int, weights: Array, trial: Trial) -> Array:
+    """[orders, held-out clips]"""
+    fold, rows = trial.fold, trial.rows
+    gamma, _ = observability(fold.train, rows)
+    model = _deterministic(fold.train, gamma, order)
+    past = noise_rows(sum(len(clip.y) for clip in fold.train), rows, fold.train[0].y.shape[1])
+    rest = [clip.y - model.simulate(clip.u) for clip in fold.train]
+    functionals, _ = predictor_space(rest, past)
+    noises = [realise(rest, past, functionals, candidate)[0] for candidate in trial.orders]
+    left = [(clip.y - model.simulate(clip.u))[:, :, None] for clip in fold.test]
+    return np.array([[_mean_square(noise.innovations(y)[0][rows:, :, 0], weights) for y in left] for noise in noises])
 
 
 def no_change_error(parts: Sequence[Fold], rows: int, weights: Array) -> float:
@@ -138,13 +154,17 @@ def choose_lead(
     if wanted != "auto":
         return Choice((), (), float(wanted))
 
-    def errors(lead_ms: float) -> Array:
-        clips = clips_at(lead_ms)
-        k = fitting_rows(clips, rows)
-        order = min(LEAD_ORDER, *possible_orders(clips, k)[-1:])
-        return deterministic_errors(folds(clips, sentences, k), k, [order], weights)
+    by_lead = [_trials_at(clips_at(lead_ms), sentences, rows) for lead_ms in LEADS_MS]
+    trials = [trial for some in by_lead for trial in some]
+    errors = in_pieces(partial(_deterministic_errors, weights), trials, "lead of the sound")
+    return plainest_good(LEADS_MS, np.concatenate([np.concatenate([next(errors) for _ in some], axis=1) for some in by_lead]))
 
-    return plainest_good(LEADS_MS, np.concatenate([errors(lead_ms) for lead_ms in track(LEADS_MS, "lead of the sound")]))
+
+def _trials_at(clips: list[Clip], sentences: Sequence[str], rows: int) -> list[Trial]:
+    """Of one lead, with a few states."""
+    k = fitting_rows(clips, rows)
+    order = min(LEAD_ORDER, *possible_orders(clips, k)[-1:])
+    return [Trial(fold, k, (order,)) for fold in folds(clips, sentences, k)]
 
 
 def choose_orders(

@@ -6,6 +6,7 @@ captured nodes fit what is heard.
 
 from collections.abc import Callable
 from copy import deepcopy
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,18 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from facesynth.corpus import Corpus, Utterance
-from facesynth.inference.expectation import EACH, RATE, Expectation, Reading, Said, Single, linear_at, rate_of
+from facesynth.inference.expectation import EACH, Expectation, Reading, Said, Single, linear_at, rate_of
 from facesynth.inference.layout import Layout
-from facesynth.inference.sound import resample
-from facesynth.inference.speech import Speech
+from facesynth.inference.sound import resample, resampled_length
 from facesynth.methods.learn import trainer
 from facesynth.methods.learn.frames import complete, complete_frames
 from facesynth.methods.learn.hearing import Features, Hearing
 from facesynth.methods.learn.linear_path import LinearPath
-from facesynth.methods.learn.other_voices import other_voice
+from facesynth.methods.learn.other_voices import RATE as VOICES_HZ
+from facesynth.methods.learn.other_voices import Change, other_voice
 from facesynth.methods.learn.point_loss import PointLoss
 from facesynth.methods.learn.pose_network import REACH, PoseNetwork, frames_ahead
+from facesynth.methods.learn.spreading import in_pieces
 from facesynth.methods.learn.trainer import Learning
 from facesynth.methods.learn.windows import Recording, Windows
 from facesynth.motion.pca import Pca
@@ -139,19 +141,18 @@ class PosePredictor(nn.Module):
 
     def heard(self, corpus: Corpus, seed: int) -> list[list[Bands]]:
         """Features [F, B] of each recording, and of `voices` changed sounds of it."""
-        rng = np.random.default_rng([seed, OTHER_VOICES])
-        return [self._heard(utterance.speech, rng) for utterance in track(corpus, "listening", len(corpus))]
+        listen = partial(_heard, self.hearing, corpus, self.voices)
+        return list(in_pieces(listen, self._drawn(corpus, np.random.default_rng([seed, OTHER_VOICES])), "listening"))
 
-    def _heard(self, speech: Speech, rng: np.random.Generator) -> list[Bands]:
-        own = self.hearing.bands(speech)
-        sound = resample(speech.audio, speech.sample_rate, RATE)
-        others = []
-        for _ in range(self.voices):
-            changed, speed = other_voice(sound, rng)
-            bands = self.hearing.of_sound(changed)
-            at = np.clip(np.arange(len(own)) / speed, 0, len(bands) - 1)
-            others.append(linear_at(bands, at).astype(np.float16))
-        return [own, *others]
+    def _drawn(self, corpus: Corpus, rng: np.random.Generator) -> list[tuple[str, dict[str, Any]]]:
+        """Each recording with what the generator is at when its voices are drawn, one recording after the other."""
+        states = []
+        for utterance in corpus if self.voices else ():
+            states.append(dict(rng.bit_generator.state))
+            length = resampled_length(len(utterance.speech.audio), utterance.speech.sample_rate, VOICES_HZ)
+            for _ in range(self.voices):
+                Change.drawn(length, rng)
+        return list(zip(corpus.ids, states or [{}] * len(corpus), strict=True))
 
     def loss(self, layout: Layout) -> PointLoss:
         """What is to be made small."""
@@ -199,6 +200,23 @@ class PosePredictor(nn.Module):
         said = Said.of(utterance.speech, emotions)
         own, *others = heard
         return Recording(own, tuple(others), said, poses.cpu().numpy(), present.astype(np.float32), utterance.motion.fps)
+
+
+def _heard(hearing: Hearing, corpus: Corpus, voices: int, one: tuple[str, dict[str, Any]]) -> list[Bands]:
+    """Features of a recording, and of changed sounds of it, drawn by a generator in the state that is given."""
+    name, state = one
+    speech = corpus[name].speech
+    own = hearing.bands(speech)
+    if not voices:
+        return [own]
+    rng, sound, others = np.random.default_rng(), resample(speech.audio, speech.sample_rate, VOICES_HZ), []
+    rng.bit_generator.state = state
+    for _ in range(voices):
+        changed, speed = other_voice(sound, rng)
+        bands = hearing.of_sound(changed)
+        at = np.clip(np.arange(len(own)) / speed, 0, len(bands) - 1)
+        others.append(linear_at(bands, at).astype(np.float16))
+    return [own, *others]
 
 
 def _no_components() -> Pca:
