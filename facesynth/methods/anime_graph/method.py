@@ -193,7 +193,8 @@ class AnimeGraph(Method):
         mixing = self.components.mixing.numpy()
         fit = partial(_fit_map, list(takes), self.split, self.map_settings, mixing, seed)
         found = zip(fitted, in_pieces(fit, fitted, "emotion maps"), strict=True)
-        self.maps.fill([FittedMap(*map(self.emotions.index, pair), *one) for pair, one in found], self.split.emotional)
+        number = self.emotions.index
+        self.maps.fill([FittedMap(number(a), number(b), *one) for (a, b), one in found], self.split.emotional)
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process, without what is made anew when it is asked for."""
