@@ -103,7 +103,8 @@ def test_of_nodes_that_cost_the_same_both_take_the_same(doubled_pair, speeches, 
 
 OTHERS = [
     {},  # the published ones
-    {"alpha": 1.042, "beta": 0.3133, "eta": 0.1079, "gamma": 0.3088, "delta": 0.0636, "phi": 0.01373},  # the found ones
+    {"alpha": 1.042, "beta": 0.3133, "eta": 0.1079, "gamma": 0.3088, "delta": 0.0636, "phi": 0.01373},  # found on one performer
+    {"alpha": 2.124, "beta": 8.259, "eta": 7.027, "gamma": 0.3163, "delta": 1.078, "phi": 1.355},  # found on several corpora
     {"alpha": 0.3, "beta": 20.0, "eta": 0.05, "gamma": 1.0, "delta": 0.03, "phi": 1.0},
 ]
 

@@ -80,14 +80,14 @@ def test_what_is_found_stands_before_every_other_evaluation(recordings, found):
     ratios = [{one: error / own[one] for one, error in tried.items()} for tried in errors.values()]
     assert all(len(one) == (1 if one["one"] > tuning.HOPELESS else 2) for one in ratios)  # then the second is not asked
     standings = [np.log(list(one.values())).mean() + 10 * max(0, *np.log(list(one.values()))) for one in ratios]
-    assert tuning._standing(list(best.ratios.values())) == pytest.approx(min(standings))
+    assert tuning.standing(list(best.ratios.values())) == pytest.approx(min(standings))
     assert min(standings) <= 0
 
 
 def test_a_loss_on_one_corpus_outweighs_ten_times_the_gain_over_all():
-    assert tuning._standing([0.9, 0.9]) == pytest.approx(np.log(0.9))
-    assert tuning._standing([0.5, 1.1, 0.5]) > tuning._standing([1.0, 1.0, 1.0]) == 0
-    assert tuning._standing([0.9, 1.001, 0.9]) < 0
+    assert tuning.standing([0.9, 0.9]) == pytest.approx(np.log(0.9))
+    assert tuning.standing([0.5, 1.1, 0.5]) > tuning.standing([1.0, 1.0, 1.0]) == 0
+    assert tuning.standing([0.9, 1.001, 0.9]) < 0
 
 
 def test_test_errors_are_those_of_a_model_with_the_settings(recordings, found):

@@ -66,7 +66,7 @@ def test_pieces_that_went_through_another_process_make_the_same_model(name, corp
         """As processes do it: function, items and results travel as bytes, and the last item may be done first."""
         asked.append(what)
         work = pickle.dumps(function)
-        done = [pickle.dumps(pickle.loads(work)(pickle.loads(pickle.dumps(item)))) for item in reversed(items)]
+        done = [pickle.dumps(pickle.loads(work)(pickle.loads(pickle.dumps(item)))) for item in reversed(items)]  # noqa: S301 - made here
         return map(pickle.loads, reversed(done))
 
     expected = alone(name)

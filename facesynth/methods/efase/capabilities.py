@@ -24,6 +24,13 @@ CAPABILITIES = Capabilities(
     ),
     abilities=frozenset({Explaining, Accounting, Reporting, Joining, Editing, Browsing}),
     nearest={
+        "penalty": 34.37,
+        "alpha": 1.042,
+        "beta": 0.3133,
+        "eta": 0.1079,
+        "gamma": 0.3088,
+        "delta": 0.0636,
+        "phi": 0.01373,
         "temperature": 1.0,
         "candidates": 60,
         "pose_weight": 1.0,

@@ -49,9 +49,9 @@ METRICS = ("sound_metric", "pose_metric")
 class Efase(Method):
     """Constrained dynamic programming over captured motion nodes (Deng & Neumann 2008).
 
-    The weights alpha … phi are those of the cost (see `Weights`). The defaults were found by `facesynth
-    tune` on the full script of the built-in performer (seed 0, 54 evaluations, 24 sentences, a database
-    of 300 utterances); configs/efase_published.yaml has those of Deng 2006. `penalty` is PNT as a multiple of
+    The weights alpha … phi are those of the cost (see `Weights`). The defaults were found by `facesynth tune` over a real talker,
+    the built-in performer, and that as articulography records it (docs/results.md); configs/efase_published.yaml has those of
+    Deng 2006, configs/efase_one_performer.yaml those that the soft form starts from. `penalty` is PNT as a multiple of
     the median rule-2 transition of the database; `database_fps` the rate at which nodes are cut, `bridge_pauses`
     whether silence is a step of the search (see `plan`).
 
@@ -86,13 +86,13 @@ class Efase(Method):
         self,
         components: float = 25,
         database_fps: float = 120.0,
-        penalty: float = 34.37,
-        alpha: float = 1.042,
-        beta: float = 0.3133,
-        eta: float = 0.1079,
-        gamma: float = 0.3088,
-        delta: float = 0.0636,
-        phi: float = 0.01373,
+        penalty: float = 3.954,
+        alpha: float = 2.124,
+        beta: float = 8.259,
+        eta: float = 7.027,
+        gamma: float = 0.3163,
+        delta: float = 1.078,
+        phi: float = 1.355,
         bridge_pauses: bool = False,
         smoothing_firm: float = 2.0,
         smoothing_loose: float = 0.5,

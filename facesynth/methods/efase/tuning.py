@@ -167,7 +167,7 @@ def tune(
         settings = [{name: trial.suggest_float(name, *ranges[name], log=True) for name in ranges} for trial in trials]
         rows = _ratios(recordings, settings, start, kept, workers, f"tuning, group {group + 1} of {generations + 1}")
         for trial, ratios in zip(trials, rows, strict=True):
-            study.tell(trial, _standing(ratios))
+            study.tell(trial, standing(ratios))
     found = study.best_params
     best = _ratios(recordings, [found], start, kept, workers, "what was found")[0]
     return Tuning(
@@ -179,7 +179,7 @@ def tune(
     )
 
 
-def _standing(ratios: Sequence[float]) -> float:
+def standing(ratios: Sequence[float]) -> float:
     """What the search makes least: the mean of the logarithms, and LOSS times the largest of them where that is a loss."""
     logs = np.log(ratios)
     return float(logs.mean() + LOSS * max(logs.max(), 0.0))
@@ -270,12 +270,13 @@ def _models(
             database, *held_out = split_for_tuning(corpus, tuning, test, seed)
             model = Efase.from_config({**settings, "learn": False, "maps": False, "residual": 0.0, "sharpening": 0.0})
             path = Path(folder) / f"{number}.safetensors"
-            model.fit(_some_of(database, limit), seed=seed).save(path)
+            model.fit(some_of(database, limit), seed=seed).save(path)
             recordings.append(Recordings(corpus.path, corpus.performer, path, *(tuple(part.ids) for part in held_out)))
         yield recordings
 
 
-def _some_of(corpus: Corpus, limit: int | None) -> Corpus:
+def some_of(corpus: Corpus, limit: int | None) -> Corpus:
+    """At most so many utterances, evenly chosen."""
     if not limit or len(corpus) <= limit:
         return corpus
     return corpus.subset([corpus.ids[i * len(corpus) // limit] for i in range(limit)])
