@@ -1,10 +1,12 @@
 """The best settings that `facesynth tune` tried, on sentences that it neither learned from, chose by nor tests on.
 
     python benchmarks/efase_finalists.py TUNED.jsonl CORPUS... --limit 70 --sentences 12 --test 20 [--finalists 12] [--more 40]
+        [--on CORPUS...]
 
 A search that tries hundreds of settings on a dozen sentences finds some that only suit these. CORPUS, --limit, --sentences,
 --test and --seed are those of the search, so the databases are the same. Prints, for each corpus, the error over that of the
-default settings, on the sentences that were searched on and on the others; and the finalist that stands best on the others.
+settings that the search started from, on the sentences that were searched on and on the others; and the finalist that stands best
+on the others. --on: try them on these corpora alone.
 """
 
 import argparse
@@ -29,37 +31,42 @@ def main() -> None:
     parser.add_argument("corpora", type=Path, nargs="+")
     for name, default in (("limit", 70), ("sentences", 12), ("test", 20), ("seed", 0), ("finalists", 12), ("more", 40)):
         parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--on", type=Path, nargs="+", help="corpora; all unless given")
     asked = parser.parse_args()
-    own = {name: float(Efase().config[name]) for name in RANGES}
-    searched = ratios_searched([Corpus.open(path).performer for path in asked.corpora], asked.journal)
+    places = [asked.corpora.index(path) for path in asked.on or asked.corpora]
+    own, searched = ratios_searched([Corpus.open(path).performer for path in asked.corpora], asked.journal)
     finalists = [settings for settings, _ in searched[: asked.finalists]]
-    columns = [errors_on_others(path, [own, PUBLISHED, *finalists], asked) for path in asked.corpora]
+    columns = [errors_on_others(asked.corpora[place], [own, PUBLISHED, *finalists], asked) for place in places]
     others = np.transpose(columns) / np.transpose(columns)[0]
-    print("| | " + " | ".join(f"{path.name}, searched on | others" for path in asked.corpora) + " | standing on others |")
+    print(
+        "| | "
+        + " | ".join(f"{path.name}, searched on | others" for path in asked.on or asked.corpora)
+        + " | standing on others |"
+    )
     print("|---|" + "---:|" * (2 * len(columns) + 1))
-    before = [[None] * len(columns)] * 2 + [ratios for _, ratios in searched]
+    before = [[None] * len(columns)] * 2 + [[ratios[place] for place in places] for _, ratios in searched]
     for number, (known, ratios) in enumerate(zip(before, others, strict=False)):
-        name = ("default", "published", *(f"finalist {k + 1}" for k in range(len(finalists))))[number]
+        name = ("start", "published", *(f"finalist {k + 1}" for k in range(len(finalists))))[number]
         cells = [f"{'' if k is None else f'{k:.3f}'} | {r:.3f}" for k, r in zip(known, ratios, strict=True)]
         print(f"| {name} | {' | '.join(cells)} | {standing(ratios):.3f} |")
     best = finalists[int(np.argmin([standing(ratios) for ratios in others[2:]]))]
     print("\n" + yaml.safe_dump({name: float(f"{best[name]:.4g}") for name in RANGES}, sort_keys=False))
 
 
-def ratios_searched(performers: list[str], journal: Path) -> list[tuple[Settings, list[float]]]:
-    """Settings that were tried on all corpora, best first, with their errors over those of the first that was tried."""
+def ratios_searched(performers: list[str], journal: Path) -> tuple[Settings, list[tuple[Settings, list[float]]]]:
+    """What a search started from; and what was tried on all corpora, best first, with its errors over those of the start."""
     tried: dict[str, dict[str, float]] = {}
     for line in journal.read_text(encoding="utf-8").splitlines()[1:]:
         row = json.loads(line)
         performer, settings = json.loads(row["key"])
         tried.setdefault(json.dumps(settings), {})[performer] = row["error"]
-    start = next(iter(tried.values()))  # the models' own settings are tried before all others
+    own, start = next(iter(tried.items()))  # the models' own settings are tried before all others
     whole = [
         (json.loads(settings), [errors[one] / start[one] for one in performers])
         for settings, errors in tried.items()
         if len(errors) == len(performers)
     ]
-    return sorted(whole, key=lambda one: standing(one[1]))
+    return json.loads(own), sorted(whole, key=lambda one: standing(one[1]))
 
 
 def errors_on_others(path: Path, settings: list[Settings], asked: argparse.Namespace) -> list[float]:
