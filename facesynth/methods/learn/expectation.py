@@ -30,7 +30,6 @@ from facesynth.methods.learn.spreading import in_pieces
 from facesynth.methods.learn.trainer import Learning
 from facesynth.methods.learn.windows import Recording, Windows
 from facesynth.motion.pca import Pca
-from facesynth.progress import track
 
 BANDS = 64
 """Of the sound."""
