@@ -29,8 +29,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("journal", type=Path)
     parser.add_argument("corpora", type=Path, nargs="+")
-    for name, default in (("limit", 70), ("sentences", 12), ("test", 20), ("seed", 0), ("finalists", 12), ("more", 40)):
-        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--limit", type=int, default=70, help="utterances of each database, evenly chosen")
+    parser.add_argument("--sentences", type=int, default=12, help="of each corpus, that were searched on")
+    parser.add_argument("--test", type=int, default=20, help="of each corpus, that are tested on")
+    parser.add_argument("--finalists", type=int, default=12)
+    parser.add_argument("--more", type=int, default=40, help="other sentences of each corpus, at most")
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--on", type=Path, nargs="+", help="corpora; all unless given")
     asked = parser.parse_args()
     places = [asked.corpora.index(path) for path in asked.on or asked.corpora]
