@@ -41,7 +41,7 @@ def test_where_a_rotation_mixes_speech_into_every_component_maps_come_nearer_all
     rotated = runpy.run_path(str(repository / "benchmarks" / "emotion_maps.py"))["rotated"]
     takes = [take for take in (take_of(u, model.components) for u in performer) if take is not None]
     way = rotated(learner(performer.layout, variance=0.98), performer, 0)
-    trial = MapTrial(takes, performer.layout, way, kinds=("exponential cross-validated",)).with_sentences(12)
+    trial = MapTrial(takes, performer.layout, way, kinds=("exponential cross-validated",)).with_sentences(20)
     assert trial.without().split.mixed
     for pair in permutations(performer.emotions, 2):
         score = trial.score(*pair, folds=3)
