@@ -100,7 +100,8 @@ def logs_of(model: Efase) -> Logs:
 def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds: int = 20, pull: float = 0.02) -> LearnedMetrics:
     """Learn on sentences that the database does not have; `pull` weighs the way from the start against the relative error.
 
-    `settings` are those of `Efase`, with a temperature above 0. A sharpening above 0 is learned as well.
+    `settings` are those of `Efase`, with a temperature above 0. A sharpening above 0 is learned as well, and where
+    an expected_share is above 0 the shares of each component.
     """
     if not settings.get("temperature", 0) > 0:
         raise FacesynthError("learning goes through the soft search; give a temperature above 0 (0.3 is a start)")
