@@ -6,8 +6,10 @@
 
 A row for each method, and one of the recorded motion, so that the drawing alone is judged; of the first method and of the
 recorded motion also as they were drawn before: a face whose place is said (`--box`) has followed points alone, and is drawn
-as before the lips were known. The face mesh finds the lips in drawn and recorded video alike; millimetres take the outer
-corners of the eyes to be 90 mm apart.
+as before the lips were known. How far lips are apart is read from what is seen between them, in drawn and recorded video alike,
+by a ruler that learned from the recorded clips of the other folds (`benchmarks/lip_ruler.py`: how well); millimetres take the
+outer corners of the eyes to be 90 mm apart. What methods make is kept in `report/motions`: a second run learns only what is
+not there, so remove what another version of a method made.
 """
 
 import argparse
@@ -17,20 +19,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from facesynth.atomic import write_text
-from facesynth.capture.landmarks import LIP_PAIRS, LOWER_INNER, OUTER_CORNERS, OUTER_CORNERS_MM, UPPER_INNER
+from facesynth.capture.landmarks import LOWER_INNER, OUTER_CORNERS, UPPER_INNER
+from facesynth.capture.lip_ruler import LipRuler, Samples, line, mesh_gaps, mm_per_px
 from facesynth.capture.points.footage import read_footage
-from facesynth.capture.square import Square
-from facesynth.capture.tracker import Tracker, around
-from facesynth.corpus import Corpus, Utterance
+from facesynth.capture.tracker import Tracker
+from facesynth.corpus import Corpus
 from facesynth.corpus.importers.points import kept_videos
 from facesynth.evaluation.contestants import Contestant, contestant
 from facesynth.evaluation.drawn_mouth import steps, sudden, teeth
+from facesynth.evaluation.predictions import load_prediction, save_prediction
 from facesynth.face.texture.compose import Report, TexturedFace, ping_pong
 from facesynth.face.texture.speaker import Speaker
-from facesynth.inference.lips import bilabial_spans, heights_between
+from facesynth.inference.lips import bilabial_spans
 from facesynth.inference.motion import Motion
 from facesynth.motion.planar import picture_points
 from facesynth.progress import track
@@ -42,9 +44,6 @@ MOUTH_PX = 24
 """Half the side of the head-fixed picture of the mouth, as the lips' width is 32 of its pixels."""
 RECORDED = "recorded motion"
 """The row that says a clip by its own recorded points."""
-STEADIED_FRAMES = 3.0
-SHIFTS = ((0.0, 0.0), (0.02, 0.02), (-0.02, 0.02), (0.02, -0.02), (-0.02, -0.02))
-"""Right and down, of the side of the square that is read."""
 Pictures = NDArray[np.uint8]
 
 
@@ -53,11 +52,11 @@ class Row:
     """Of one clip, recorded or drawn."""
 
     gaps_mm: tuple[float, ...]
-    """Smallest gap at each p, b and m, pictures read in steady squares."""
+    """Smallest gap at each p, b and m, read from the pictures."""
     recorded_mm: tuple[float, ...]
     """The recorded ones of the same clip."""
-    followed_mm: tuple[float, ...]
-    """Smallest gap at each p, b and m where the square follows the face, as in capture."""
+    mesh_mm: tuple[float, ...]
+    """The same by the face mesh, which hardly sees a slit between lips and has a gap where they are shut."""
     folded: float
     """Triangles turned over, in all pictures."""
     jumps: float
@@ -81,32 +80,74 @@ def main() -> None:
     options = parser.parse_args()
     rows: dict[str, list[Row]] = {}
     corpus, plain = Corpus.open(options.corpus), options.before and Corpus.open(options.before)
-    methods = [contestant(spec) for spec in options.methods]
+    methods, clips = [contestant(spec) for spec in options.methods], recorded_clips(corpus)
     for train, test in track(list(corpus.folds(options.folds)), "folds"):
-        made = drawn(plain, train.ids, test.ids, methods[:1], ", before", **BEFORE) if plain else {}
-        made |= drawn(corpus, train.ids, test.ids, methods)
-        for utterance in test:
-            judge(utterance, read_footage(kept_videos(corpus)[utterance.id]).frames, made, rows, options.output)
+        kept = options.output / "motions"
+        made = drawn(plain, train.ids, test.ids, methods[:1], kept, ", before", **BEFORE) if plain else {}
+        made |= drawn(corpus, train.ids, test.ids, methods, kept)
+        ruler = LipRuler.learn([clips[name].samples for name in train.ids])
+        for name in test.ids:
+            judge(name, clips[name], ruler, made, rows, options.output)
         write_text(options.output / "table.md", table(rows))
     print(table(rows))
 
 
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A recorded clip, seen once."""
+
+    video: Path
+    points: NDArray[np.float64]
+    """[T, 468, 2] px the face mesh."""
+    spans: list[tuple[int, int]]
+    """Frames of each p, b and m."""
+    samples: Samples
+
+    def frames(self) -> Pictures:
+        """[T, H, W, 3]"""
+        return read_footage(self.video).frames
+
+
+def recorded_clips(corpus: Corpus) -> dict[str, Recorded]:
+    """Of each utterance."""
+    out, videos = {}, kept_videos(corpus)
+    for utterance in track(list(corpus), "looking at recorded clips"):
+        frames = read_footage(videos[utterance.id]).frames
+        points = landmarks(frames)
+        said = bilabial_spans(utterance.speech.phones, utterance.motion.fps)
+        spans = [(start, min(stop, len(frames))) for start, stop in said if start < min(stop, len(frames))]
+        out[utterance.id] = Recorded(videos[utterance.id], points, spans, Samples.of(frames, points, spans))
+    return out
+
+
 def drawn(
-    corpus: Corpus, train: tuple[str, ...], test: tuple[str, ...], methods: list[Contestant], when: str = "", **settings: Any
+    corpus: Corpus,
+    train: tuple[str, ...],
+    test: tuple[str, ...],
+    methods: list[Contestant],
+    kept: Path,
+    when: str = "",
+    **settings: Any,
 ) -> dict[str, dict[str, tuple[Pictures, Report]]]:
     """By row: the pictures of each utterance of `test` on the face of `train`, by models of it and by the recorded points."""
     others = corpus.subset(train)
     speaker = speaker_of(others)
     face = TexturedFace(speaker, **settings)
-    motions = {one.label + when: said(one, others, corpus.subset(test), speaker) for one in methods}
+    motions = {one.label + when: said(one, others, corpus.subset(test), speaker, kept / (one.label + when)) for one in methods}
     motions[RECORDED + when] = {utterance.id: utterance.motion for utterance in corpus.subset(test)}
     return {row: {name: pictures(face, motion) for name, motion in some.items()} for row, some in motions.items()}
 
 
-def said(method: Contestant, train: Corpus, test: Corpus, speaker: Speaker) -> dict[str, Motion]:
-    """What a method makes of each utterance, its lips shut as where a real face speaks."""
+def said(method: Contestant, train: Corpus, test: Corpus, speaker: Speaker, kept: Path) -> dict[str, Motion]:
+    """What a method makes of each utterance, its lips shut as where a real face speaks; read where it was `kept`."""
+    paths = {utterance.id: kept / f"{utterance.id}.npz" for utterance in test}
+    if all(path.is_file() for path in paths.values()):
+        return {name: load_prediction(path)[1] for name, path in paths.items()}
     model = method.create().fit(train)
-    return {u.id: closed_at_phones(model.synthesize(u.speech), u.speech.phones, speaker) for u in test}
+    made = {u.id: closed_at_phones(model.synthesize(u.speech), u.speech.phones, speaker) for u in test}
+    for name, motion in made.items():
+        save_prediction(paths[name], name, motion)
+    return made
 
 
 def pictures(face: TexturedFace, motion: Motion) -> tuple[Pictures, Report]:
@@ -116,39 +157,37 @@ def pictures(face: TexturedFace, motion: Motion) -> tuple[Pictures, Report]:
 
 
 def judge(
-    utterance: Utterance,
-    real: Pictures,
+    name: str,
+    clip: Recorded,
+    ruler: LipRuler,
     made: dict[str, dict[str, tuple[Pictures, Report]]],
     rows: dict[str, list[Row]],
     output: Path,
 ) -> None:
-    """Add a row of one clip to each of `rows`, and save some of its pictures side by side."""
-    clips = {"recorded": real} | {name: drawn[utterance.id][0] for name, drawn in made.items()}
-    seen = {name: landmarks(frames) for name, frames in clips.items()}
-    spans = [span for span in bilabial_spans(utterance.speech.phones, 25.0) if span[1] > span[0]]
-    followed = {name: smallest_gaps(points, spans) for name, points in seen.items()}
-    gaps = {name: smallest_gaps(read_again(clips[name], points, spans), spans) for name, points in seen.items()}
-    mouths = {name: mouth_pictures(clips[name], points) for name, points in seen.items()}
-    moved = {name: steps(grey) for name, (grey, _) in mouths.items()}
-    for name in clips:
-        report = made[name][utterance.id][1] if name in made else Report()
-        found = teeth(*mouths[name])
-        own, recorded = (tuple(gaps[which].tolist()) for which in (name, "recorded"))
-        jumpy = sudden(moved[name], moved["recorded"])
-        drawing = (float(report.folded_triangles), float(report.jumps))
-        rows.setdefault(name, []).append(
+    """Add a row of one clip to each of `rows`, and save some of its pictures side by side, and those of p, b and m."""
+    clips = {"recorded": clip.frames()} | {row: drawn[name][0] for row, drawn in made.items()}
+    seen = {row: landmarks(frames) if row in made else clip.points for row, frames in clips.items()}
+    closed = {row: smallest_gaps(gaps_by(ruler, clips[row], points, clip.spans), clip.spans) for row, points in seen.items()}
+    mouths = {row: mouth_pictures(clips[row], points) for row, points in seen.items()}
+    moved = {row: steps(grey) for row, (grey, _) in mouths.items()}
+    for row, (gaps, _) in closed.items():
+        report = made[row][name][1] if row in made else Report()
+        found = teeth(*mouths[row])
+        rows.setdefault(row, []).append(
             Row(
-                own,
-                recorded,
-                tuple(followed[name].tolist()),
-                *drawing,
-                jumpy,
+                tuple(gaps),
+                tuple(closed["recorded"][0]),
+                tuple(smallest_gaps(mesh_gaps(seen[row]), clip.spans)[0]),
+                float(report.folded_triangles),
+                float(report.jumps),
+                sudden(moved[row], moved["recorded"]),
                 found.left_over,
                 found.blinking,
                 report.real_time_factor,
             )
         )
-    save_sheet(clips, seen, output / f"{utterance.id}.png")
+    save_sheet(clips, seen, {row: list(range(12, len(clip.points) - 12, 4)) for row in clips}, output / f"{name}.png")
+    save_sheet(clips, seen, {row: frames for row, (_, frames) in closed.items()}, output / f"{name}_closed.png")
 
 
 def landmarks(frames: Pictures) -> NDArray[np.float64]:
@@ -160,29 +199,19 @@ def landmarks(frames: Pictures) -> NDArray[np.float64]:
     return np.stack(found)
 
 
-def read_again(frames: Pictures, points: NDArray[np.float64], spans: list[tuple[int, int]]) -> NDArray[np.float64]:
-    """Landmarks [T, 468, 2] like `points`, those of spans of frames anew: the mean of readings in squares that are steady.
-
-    What the mesh finds in a picture changes by half a millimetre with the square that is cut out for it, and a square that
-    follows the face has the size that the mouth had in the picture before.
-    """
-    tracker, found = Tracker(), points.copy()
-    whole = around(np.median(points, axis=0))
-    middles = gaussian_filter1d((points.min(axis=1) + points.max(axis=1)) / 2, STEADIED_FRAMES, axis=0, mode="nearest")
-    for t in sorted({t for start, stop in spans for t in range(start, min(stop, len(frames)))}):
-        (x, y), side = middles[t].tolist(), whole.side_px
-        squares = [Square(x + right * side, y + down * side, side, whole.tilt_rad) for right, down in SHIFTS]
-        seen = [looked.points[:, :2] for square in squares if (looked := tracker.look(frames[t], square)) is not None]
-        found[t] = np.mean(seen, axis=0) if seen else points[t]
-    return found
+def gaps_by(ruler: LipRuler, frames: Pictures, points: NDArray[np.float64], spans: list[tuple[int, int]]) -> NDArray[np.float64]:
+    """[T] mm between the lips in frames of the spans; infinite in others."""
+    gaps, scale = np.full(len(frames), np.inf), mm_per_px(points)
+    looked = sorted({t for span in spans for t in range(*span)})
+    if looked:
+        gaps[looked] = ruler.read(np.stack([line(frames[t], points[t], scale) for t in looked]))
+    return gaps
 
 
-def smallest_gaps(points: NDArray[np.float64], spans: list[tuple[int, int]]) -> NDArray[np.float64]:
-    """[S] mm"""
-    across = points[:, OUTER_CORNERS[0]] - points[:, OUTER_CORNERS[1]]
-    mm = OUTER_CORNERS_MM / np.linalg.norm(across, axis=1).mean()
-    gap = -mm * heights_between(points, LIP_PAIRS).mean(axis=1)
-    return np.array([gap[start : min(stop, len(gap))].min() for start, stop in spans if start < len(gap)])
+def smallest_gaps(gaps: NDArray[np.float64], spans: list[tuple[int, int]]) -> tuple[list[float], list[int]]:
+    """Of gaps [T] in each span, and the frames."""
+    narrow = [start + int(gaps[start:stop].argmin()) for start, stop in spans]
+    return gaps[narrow].tolist(), narrow
 
 
 def mouth_pictures(frames: Pictures, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -211,16 +240,16 @@ def _inside(place: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[n
     return np.asarray((place[..., 1] > top + 1) & (place[..., 1] < bottom - 1))
 
 
-def save_sheet(clips: dict[str, Pictures], seen: dict[str, NDArray[np.float64]], path: Path, every: int = 4) -> None:
-    """Mouths enlarged: a row for each way, every so many pictures of the spoken part."""
+def save_sheet(clips: dict[str, Pictures], seen: dict[str, NDArray[np.float64]], shown: dict[str, list[int]], path: Path) -> None:
+    """Mouths enlarged: a row for each way, of the frames `shown` of it."""
     from PIL import Image
 
-    count = min(map(len, clips.values()))
+    if not all(shown.values()):
+        return
     lines = []
     for name, frames in clips.items():
         x, y = np.median(seen[name][:, [13, 14]].mean(axis=1), axis=0).round().astype(int)
-        crops = [frames[t, y - 28 : y + 34, x - 34 : x + 34] for t in range(12, count - 12, every)]
-        lines.append(np.concatenate(crops, axis=1))
+        lines.append(np.concatenate([frames[t, y - 28 : y + 34, x - 34 : x + 34] for t in shown[name]], axis=1))
     sheet = Image.fromarray(np.concatenate(lines))
     path.parent.mkdir(parents=True, exist_ok=True)
     sheet.resize((2 * sheet.width, 2 * sheet.height), Image.Resampling.BICUBIC).save(path)
@@ -229,13 +258,12 @@ def save_sheet(clips: dict[str, Pictures], seen: dict[str, NDArray[np.float64]],
 def table(rows: dict[str, list[Row]]) -> str:
     """Markdown: gaps over all p, b and m of all clips, the others as means over clips."""
     names = [field.name for field in fields(Row)][3:]
-    head = ["median smallest gap, mm", "median distance from the recorded one", "median where the square follows", *names]
+    head = ["smallest gap at p, b, m, median, mm", "more than recorded, median", "distance from the recorded one, median"]
+    head += ["smallest gap by the face mesh, median", *names]
     lines = ["| | " + " | ".join(head) + " |", "|---|" + "---:|" * len(head)]
     for name, some in rows.items():
-        gaps, recorded, followed = (
-            np.concatenate([getattr(row, field) for row in some]) for field in ("gaps_mm", "recorded_mm", "followed_mm")
-        )
-        values = [np.median(gaps), np.median(np.abs(gaps - recorded)), np.median(followed)]
+        gaps, recorded, mesh = (np.concatenate([getattr(row, f) for row in some]) for f in ("gaps_mm", "recorded_mm", "mesh_mm"))
+        values = [np.median(gaps), np.median(gaps - recorded), np.median(np.abs(gaps - recorded)), np.median(mesh)]
         values += [np.nanmean([getattr(row, field) for row in some]) for field in names]
         lines.append(f"| {name} | " + " | ".join(f"{value:.3g}" for value in values) + " |")
     closures = sum(len(row.gaps_mm) for row in rows["recorded"])

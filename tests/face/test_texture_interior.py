@@ -153,6 +153,18 @@ def test_shut_lips_are_taken_from_pictures_of_shut_lips(speaker):
     assert TexturedFace(replace(known, shut=np.zeros(0))).choose(wanted, "nearest")[0] == 1
 
 
+def test_nothing_of_an_open_mouth_fades_over_shut_lips(speaker):
+    """A closure takes two pictures: one of before that fades within them, warped shut, would be a slit."""
+    known, background = as_a_mesh_sees(speaker), np.zeros(4, int)
+    wanted = on_the_red(np.stack([shape(opening) for opening in (15.0, 15.0, -2.0, 9.0)]))
+    hard, soft = (
+        np.stack(list(TexturedFace(known, fade_s=fade_s).draw(wanted, background, Report(), "nearest"))).astype(float)
+        for fade_s in (0.0, 0.12)
+    )
+    faded = np.abs(hard - soft).max(axis=(1, 2, 3))
+    assert faded[2] < 0.3 * faded[3]
+
+
 def test_the_face_draws_it_and_a_speaker_without_lips_does_not(speaker):
     plain = replace(speaker, inner_lips=np.zeros(0, np.int64), jaw=np.zeros(0, np.int64))
     shapes, background = np.stack([shape(11.2)]), np.array([0])

@@ -144,7 +144,7 @@ class TexturedFace:
         sources = self._chosen(shapes, choice)
         following = self._following(sources)
         report.jumps, report.fps = int((~following).sum()), self.speaker.fps
-        drawn_from = self._fades(sources, following)
+        drawn_from = self._fades(sources, following, self.speaker.shut_share(shapes))
         for first in range(0, len(shapes), BATCH):
             began = time.perf_counter()
             part = slice(first, first + BATCH)
@@ -161,8 +161,12 @@ class TexturedFace:
         """[T - 1] whether the next picture is the same one, or the one recorded next."""
         return (np.diff(sources) == 0) | ((np.diff(sources) == 1) & ~self.speaker.clip_starts[sources[1:]])
 
-    def _fades(self, sources: NDArray[np.int64], following: NDArray[np.bool_]) -> Sources:
-        """Pictures `sources` [T], those that the ones before jumps would have gone on to, and how much of these is still seen."""
+    def _fades(self, sources: NDArray[np.int64], following: NDArray[np.bool_], shut: NDArray[np.float64]) -> Sources:
+        """Pictures `sources` [T], those that the ones before jumps would have gone on to, and how much of these is still seen.
+
+        The less, the more the lips are `shut` [T]: a closure takes two or three pictures, and an open mouth in it, warped shut,
+        is a slit.
+        """
         before, share = sources.copy(), np.zeros(len(sources))
         for jump in np.flatnonzero(~following) + 1:
             old = sources[jump - 1]
@@ -171,7 +175,7 @@ class TexturedFace:
                 old_goes_on = not self.speaker.clip_starts[old + 1 : onward + 1].any()
                 before[jump + k] = onward if old_goes_on else before[jump + k - 1] if k else old
                 share[jump + k] = 1 - (k + 1) / (self.fade + 1)
-        return Sources(sources, before, share)
+        return Sources(sources, before, share * (1 - shut))
 
     def choose(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
         """[T] number of the training picture for each shape [T, K, 2]."""

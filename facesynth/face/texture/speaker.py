@@ -87,10 +87,15 @@ class Speaker:
 
         A shut mouth looks like no open one that is warped to it: lips are pressed together, and no hole is to be hidden.
         """
+        return SHUT_WEIGHT * np.stack([self.shut_share(shapes), np.zeros(len(shapes))], axis=-1)[:, None]
+
+    def shut_share(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """[T] 1 where lips of shapes [T, K, 2], see `meeting`, are shut, 0 where they are clearly open, or none are known."""
+        if not len(self.shut):
+            return np.zeros(len(shapes))
         upper, lower = facing(self.inner_lips)
         opening = np.linalg.norm(shapes[:, lower] - shapes[:, upper], axis=-1).mean(axis=1)
-        share = np.clip(1 - opening / (SHUT_UP_TO * Lips.of(self.shapes, self.inner_lips).width), 0, 1)
-        return np.stack([SHUT_WEIGHT * share, np.zeros(len(shapes))], axis=-1)[:, None]
+        return np.clip(1 - opening / (SHUT_UP_TO * Lips.of(self.shapes, self.inner_lips).width), 0, 1)
 
     def lips_apart(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
         """[T, U, 2] px how far the lips of shapes [T, K, 2] are apart, on a scale on which the first pixels count most.
