@@ -2,7 +2,7 @@
 
     facesynth corpus add actor/ clips/*.mp4 --points --text-file lines.csv
     facesynth corpus add plain/ clips/*.mp4 --points --box 100,60,225,242 --text-file lines.csv
-    python benchmarks/real_face.py actor/ lds network efase:configs/efase_soft.yaml --before plain/ -o report/ [--folds 5]
+    python benchmarks/real_face.py actor/ lds network efase:configs/efase_soft.yaml --before plain/ -o report/ [--first 3]
 
 A row for each method, and one of the recorded motion, so that the drawing alone is judged; of the first method and of the
 recorded motion also as they were drawn before: a face whose place is said (`--box`) has followed points alone, and is drawn
@@ -77,11 +77,12 @@ def main() -> None:
     parser.add_argument("--before", type=Path, help="the same clips, added with --box")
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--folds", type=int, default=5)
+    parser.add_argument("--first", type=int, help="test only so many of the folds")
     options = parser.parse_args()
     rows: dict[str, list[Row]] = {}
     corpus, plain = Corpus.open(options.corpus), options.before and Corpus.open(options.before)
     methods, clips = [contestant(spec) for spec in options.methods], recorded_clips(corpus)
-    for train, test in track(list(corpus.folds(options.folds)), "folds"):
+    for train, test in track(list(corpus.folds(options.folds))[: options.first], "folds"):
         kept = options.output / "motions"
         made = drawn(plain, train.ids, test.ids, methods[:1], kept, ", before", **BEFORE) if plain else {}
         made |= drawn(corpus, train.ids, test.ids, methods, kept)

@@ -1,5 +1,6 @@
 """The pictures of a speaker whose real face is shown: taken from a corpus of followed points, kept beside the model."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from facesynth.capture.points.footage import read_footage
 from facesynth.capture.points.shapes import Shapes
-from facesynth.corpus import Corpus
+from facesynth.corpus import Corpus, Utterance
 from facesynth.corpus.importers.points import kept_videos, shapes_beside
 from facesynth.face.texture.lips import facing
 from facesynth.face.texture.speaker import Speaker, lower_face_window
@@ -28,6 +29,8 @@ SHORT_FRAMES = 25
 OTHER_LIGHT = 15.0
 """Distance (0..255) of the mean colours of the lower face: clips further from the background's show up as seams over it."""
 SUFFIX = ".face.npz"
+PRESSED_UP_TO = 1.4
+"""Of how far lips are apart where p, b and m shut them: in a picture in which they are farther, they are not pressed together."""
 
 
 def face_path(model: Path) -> Path:
@@ -80,6 +83,7 @@ def speaker_of(corpus: Corpus) -> Speaker:
         inner_lips=inner_outline(corpus.layout),
         jaw=corpus.layout.group("jaw") if has_mouth(corpus.layout) else np.zeros(0, np.int64),
         shut=shut_lips(corpus),
+        pressed=pressed_pictures(corpus, {name: len(cut) for name, cut in zip(chosen, cuts, strict=True)}),
     )
 
 
@@ -87,15 +91,29 @@ def shut_lips(corpus: Corpus) -> NDArray[np.float64]:
     """[U] px between facing points of the inner lips where p, b and m are narrowest, the median; none where none is said."""
     if not has_mouth(corpus.layout):
         return np.zeros(0)
-    upper, lower = facing(inner_outline(corpus.layout))
-    found = []
-    for utterance in corpus:
-        points = picture_points(utterance.motion.frames)
-        across = np.linalg.norm(points[:, lower] - points[:, upper], axis=-1)
-        for start, stop in bilabial_spans(utterance.speech.phones, utterance.motion.fps):
-            if len(said := across[start:stop]):
-                found.append(said[said.mean(axis=1).argmin()])
+    found = [across for utterance in corpus for _, across in _narrowest(utterance)]
     return np.median(found, axis=0) if found else np.zeros(0)
+
+
+def pressed_pictures(corpus: Corpus, counts: dict[str, int]) -> NDArray[np.bool_]:
+    """[N] which pictures, so many of each utterance, are the narrowest of a p, b or m that shuts the lips."""
+    shut, out = shut_lips(corpus), []
+    for name, count in counts.items():
+        pressed = np.zeros(count, np.bool_)
+        for frame, across in _narrowest(corpus[name]) if len(shut) else ():
+            pressed[frame] = across.mean() <= PRESSED_UP_TO * shut.mean()
+        out.append(pressed)
+    return np.concatenate(out)
+
+
+def _narrowest(utterance: Utterance) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """The frame in which each p, b and m is narrowest, and px between facing points of the inner lips [U] in it."""
+    upper, lower = facing(inner_outline(utterance.motion.layout))
+    points = picture_points(utterance.motion.frames)
+    across = np.linalg.norm(points[:, lower] - points[:, upper], axis=-1)
+    for start, stop in bilabial_spans(utterance.speech.phones, utterance.motion.fps):
+        if len(said := across[start:stop]):
+            yield start + int(said.mean(axis=1).argmin()), said[said.mean(axis=1).argmin()]
 
 
 def closed_at_phones(motion: Motion, phones: PhoneTrack, speaker: Speaker) -> Motion:

@@ -11,7 +11,7 @@ from facesynth.inference.lips import gap
 from facesynth.inference.motion import Motion
 from facesynth.inference.speech import EmotionTrack, PhoneTrack, Speech
 from facesynth.motion.planar import inner_outline, motion_frames, picture_points, tracked_layout
-from facesynth.stage.speaker_pictures import closed_at_phones, shut_lips
+from facesynth.stage.speaker_pictures import closed_at_phones, pressed_pictures, shut_lips
 
 FPS, RATE = 25.0, 16_000
 LAYOUT = tracked_layout(4, mouth=True)
@@ -50,12 +50,18 @@ def test_the_median_of_the_narrowest_moments_counts(corpus):
     np.testing.assert_allclose(shut_lips(corpus), np.full(9, 3.0), atol=1e-4)
 
 
+def test_pictures_of_pressed_lips_are_the_narrowest_of_what_shuts_them(corpus):
+    found = pressed_pictures(corpus, {"b": 50, "a": 50})
+    assert np.flatnonzero(found).tolist() == [12, 62, 82]  # b stays 8 px open in its second one
+
+
 def test_where_nobody_says_one_nothing_is_known(corpus):
     speech = corpus["a"].speech
     open_all_along = replace(speech, phones=PhoneTrack(("aa",), np.array([2.0])))
     others = Corpus.create(corpus.path.parent / "d", performer="p", layout=LAYOUT, fps=FPS, emotions=("neutral",))
     others.add_utterance(Record("a", sentence="a"), open_all_along, spoken([2.0, 2.0]))
     assert len(shut_lips(others)) == 0
+    assert not pressed_pictures(others, {"a": 50}).any()
 
 
 def test_lips_and_jaw_shut_at_each_of_them(corpus):

@@ -165,7 +165,8 @@ def test_saved_speakers_come_back_and_bad_files_do_not(speaker, tmp_path):
     (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     replace(speaker, shift=speaker.shift[:3]).save(tmp_path / "odd.npz")
-    for name in ("cut.npz", "other.npz", "none.npz", "odd.npz"):
+    replace(speaker, pressed=np.ones(3, bool)).save(tmp_path / "few.npz")
+    for name in ("cut.npz", "other.npz", "none.npz", "odd.npz", "few.npz"):
         with pytest.raises(FacesynthError, match=name):
             Speaker.load(tmp_path / name)
 

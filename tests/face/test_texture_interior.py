@@ -153,6 +153,16 @@ def test_shut_lips_are_taken_from_pictures_of_shut_lips(speaker):
     assert TexturedFace(replace(known, shut=np.zeros(0))).choose(wanted, "nearest")[0] == 1
 
 
+def test_pressed_lips_are_for_a_moment_and_resting_ones_for_longer(speaker):
+    """A mesh sees no difference between them."""
+    names = ("pictures", "linear", "shift")
+    few = replace(speaker, **{name: getattr(speaker, name)[:3] for name in names}, clip_starts=np.array([True, False, False]))
+    shapes = on_the_red(np.stack([shape(opening) for opening in (-2.0, -2.0, 6.0)]))
+    face = TexturedFace(replace(few, shapes=shapes, shut=np.full(7, 2 * RED), pressed=np.array([False, True, False])))
+    assert face.choose(shapes[[2, 0, 0, 2]], "nearest").tolist() == [2, 1, 1, 2]
+    assert face.choose(shapes[[2, *[0] * 12, 2]], "nearest").tolist() == [2, *[0] * 12, 2]
+
+
 def test_nothing_of_an_open_mouth_fades_over_shut_lips(speaker):
     """A closure takes two pictures: one of before that fades within them, warped shut, would be a slit."""
     known, background = as_a_mesh_sees(speaker), np.zeros(4, int)

@@ -183,7 +183,7 @@ class TexturedFace:
 
     def _chosen(self, shapes: NDArray[np.float64], choice: Choice) -> NDArray[np.int64]:
         """The same for shapes whose lips meet where they are shut."""
-        wanted, known = self.speaker.compared(shapes), self.speaker.compared(self.speaker.shapes)
+        wanted, known = self.speaker.compared(shapes), self.speaker.known
         if choice == "nearest":
             return nearest(wanted, known)
         return coherent(wanted, known, self._looks, self.speaker.clip_starts, self.jump_weight)

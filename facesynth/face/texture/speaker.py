@@ -16,12 +16,16 @@ from facesynth.motion.planar import HeadMaps
 
 LOOK_PX = 16
 """Side of the little grey picture of the lower face by which pictures are compared."""
-OF_THE_MOUTH = ("inner_lips", "jaw", "shut")
+OF_THE_MOUTH = ("inner_lips", "jaw", "shut", "pressed")
 """Arrays that files from before there were lips lack."""
 OPENING_WEIGHT = 10.0
 """How much more than a point's place a distance of the lips counts where shapes are compared."""
 SHUT_WEIGHT = 18.0
 """px; how much shut and open mouths differ where shapes are compared: more than jumps to a picture of shut lips and back."""
+PRESSED_WEIGHT = 12.0
+"""px; how much lips that are pressed together for a moment and others differ where shapes are compared."""
+MOMENT_S = 0.3
+"""Lips that are shut for longer rest: no p, b or m takes so long."""
 SHUT_UP_TO = 0.06
 """Of the mouth's width: a mean distance of the inner lips from which on they count as open."""
 MARGIN_PX = 4
@@ -58,6 +62,8 @@ class Speaker:
     """Numbers of the points that move with the jaw."""
     shut: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     """px how far apart points of the inner lips that face each other are where lips are shut; none if unknown, see `meeting`."""
+    pressed: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    """[N] whether a training picture shows lips at their narrowest in a p, b or m; none if unknown."""
 
     @property
     def knows_lips(self) -> bool:
@@ -72,22 +78,39 @@ class Speaker:
         usual = np.linalg.norm(self.shapes[:, lower] - self.shapes[:, upper], axis=-1).mean(axis=0)
         return meeting(shapes, self.inner_lips, self.shut, usual)
 
+    @property
+    def known(self) -> NDArray[np.float64]:
+        """[N, K', 2] by which the training pictures are compared with `compared` shapes."""
+        return self._compared(self.shapes, self.pressed if len(self.pressed) else np.zeros(len(self.shapes)))
+
     def compared(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
         """[T, K', 2] by which shapes [T, K, 2] are compared: their points and, where the lips are known, how far these are open.
 
         A mouth of another opening is not told by its points alone: of two hundred, few lie on the lips.
         """
+        return self._compared(shapes, self.pressing(shapes) if len(self.pressed) else np.zeros(len(shapes)))
+
+    def _compared(self, shapes: NDArray[np.float64], pressed: NDArray[Any]) -> NDArray[np.float64]:
         if not self.knows_lips:
             return shapes
         known = np.concatenate([shapes, OPENING_WEIGHT * self.lips_apart(shapes)], axis=1)
-        return np.concatenate([known, np.sqrt(known.shape[1]) * self.shutness(shapes)], axis=1) if len(self.shut) else known
+        if not len(self.shut):
+            return known
+        # A shut mouth looks like no open one that is warped to it: lips are pressed together, and no hole is to be hidden.
+        mouth = np.stack([SHUT_WEIGHT * self.shut_share(shapes), PRESSED_WEIGHT * pressed], axis=-1)[:, None]
+        return np.concatenate([known, np.sqrt(known.shape[1]) * mouth], axis=1)
 
-    def shutness(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """[T, 1, 2] SHUT_WEIGHT px where lips of shapes [T, K, 2], see `meeting`, are shut, 0 where they are clearly open.
+    def pressing(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """[T] how far lips of shapes [T, K, 2] that follow each other are shut, where that is for a moment; else 0.
 
-        A shut mouth looks like no open one that is warped to it: lips are pressed together, and no hole is to be hidden.
+        A mesh has lips that rest on each other, and ones that are about to close, where pressed ones are; they look different.
         """
-        return SHUT_WEIGHT * np.stack([self.shut_share(shapes), np.zeros(len(shapes))], axis=-1)[:, None]
+        shut = self.shut_share(shapes)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], shut > 0.5, [0]]))).reshape(-1, 2)
+        momentary = np.zeros(len(shapes))
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] <= MOMENT_S * self.fps]:
+            momentary[start:stop] = shut[start:stop]
+        return momentary
 
     def shut_share(self, shapes: NDArray[np.float64]) -> NDArray[np.float64]:
         """[T] 1 where lips of shapes [T, K, 2], see `meeting`, are shut, 0 where they are clearly open, or none are known."""
@@ -184,6 +207,8 @@ def _fault(speaker: Speaker) -> str:
             return f"{name} has shape {array.shape}, or is not finite"
     if len(speaker.shut) and (speaker.shut.shape != facing(speaker.inner_lips)[0].shape or not np.isfinite(speaker.shut).all()):
         return f"shut has shape {speaker.shut.shape}, or is not finite"
+    if len(speaker.pressed) and (speaker.pressed.shape != (count,) or speaker.pressed.dtype.kind != "b"):
+        return f"pressed has shape {speaker.pressed.shape}, or does not say yes or no"
     for name in ("inner_lips", "jaw"):
         numbers = getattr(speaker, name)
         if (
