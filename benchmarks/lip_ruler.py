@@ -71,11 +71,11 @@ def readings_of(clip: Recorded, ruler: LipRuler, shut_mm: float) -> Iterator[Rea
     frames, scale = clip.frames(), mm_per_px(clip.points)
     gaps = mesh_gaps(clip.points)
     narrow = [start + int(gaps[start:stop].argmin()) for start, stop in clip.spans]
-    dark, bright = (
-        np.quantile(clip.samples.inside.reshape(-1, 3), [0.1, 0.9], axis=0) if len(clip.samples.inside) else (None, None)
-    )
+    if not len(clip.samples.inside):
+        return
+    dark, bright = np.quantile(clip.samples.inside.reshape(-1, 3), [0.1, 0.9], axis=0)
     for t in narrow:
-        if gaps[t] > shut_mm or dark is None:
+        if gaps[t] > shut_mm:
             continue
         skin = skin_colour(line_colours(frames[t], clip.points[t], scale))
         shut = read(frames[t], clip.points[t], scale, ruler)
@@ -88,7 +88,7 @@ def readings_of(clip: Recorded, ruler: LipRuler, shut_mm: float) -> Iterator[Rea
 
 def read(picture: Picture, points: Points, scale: float, ruler: LipRuler) -> tuple[float, ...]:
     """mm, for each of READINGS, of a picture whose face was at `points` [468, 2]."""
-    tracker, square = Tracker(), around(points)
+    tracker, square = Tracker(), around(points.astype(np.float32))
     apart = ((square.x_px + x * square.side_px, square.y_px + y * square.side_px) for x, y in SHIFTS)
     looks = [tracker.look(picture, Square(x, y, square.side_px, square.tilt_rad)) for x, y in apart]
     found = np.stack([look.points[:, :2] for look in looks if look is not None]).astype(np.float64)
@@ -108,7 +108,7 @@ def opened(picture: Picture, points: Points, gap_px: float, inside: NDArray[np.f
     top, bottom = int(touching.min() - FAR_PX), int(touching.max() + FAR_PX) + 1
     rows = np.arange(top, bottom, 1 / FINE) + 0.5 / FINE - 0.5
     for x, contact in zip(columns, touching, strict=True):
-        away, wide = rows - contact, gap_px * _bow(x, middle, half) / 2
+        away, wide = rows - contact, gap_px * _bow(float(x), middle, half) / 2
         moved = np.clip((FAR_PX - np.abs(away)) / (FAR_PX - NEAR_PX), 0, 1)
         source = rows - np.sign(away) * np.minimum(np.abs(away), wide * moved * moved * (3 - 2 * moved))
         column = np.stack([np.interp(source, np.arange(len(picture)), picture[:, x, k]) for k in range(3)], axis=-1)
