@@ -1,6 +1,6 @@
 """Methods on a few long takes: the table of an evaluation, beside an older one's, and who is nearer, block by block.
 
-python benchmarks/takes.py CORPUS PREDICTIONS [--older PREDICTIONS] [--block-s 5] [--against network "efase soft"]
+python benchmarks/takes.py CORPUS PREDICTIONS [--older PREDICTIONS] [--takes ID …] [--block-s 5] [--against network efase]
 
 PREDICTIONS are the folders that `facesynth evaluate CORPUS … -o report/` leaves in `report/predictions`. Four takes tell no two
 methods apart (p is at least 1/8), so each is cut into blocks: a block's figure is the lip error (`lve`) of its frames. Blocks of
@@ -32,11 +32,12 @@ def main() -> None:
     parser.add_argument("corpus")
     parser.add_argument("predictions", type=Path)
     parser.add_argument("--older", type=Path, help="predictions of the same takes, of rows by the same names")
+    parser.add_argument("--takes", nargs="*", help="of which the figures are; all otherwise. Rows that lack one are left out")
     parser.add_argument("--block-s", type=float, default=5.0)
     parser.add_argument("--against", nargs="*", default=["network"], help="rows that all others are compared with")
     asked = parser.parse_args()
     corpus = Corpus.open(asked.corpus)
-    truth = {name: corpus[name].motion for name in corpus.ids}
+    truth = {name: corpus[name].motion for name in asked.takes or corpus.ids}
     rows = predicted(asked.predictions, truth)
     older = predicted(asked.older, truth) if asked.older else {}
     cut = {label: blocks(takes, truth, asked.block_s) for label, takes in rows.items()}
