@@ -100,12 +100,13 @@ def test_test_errors_are_those_of_a_model_with_the_settings(recordings, found):
         assert tested.nearer + tested.farther <= len(of.test)
 
 
-def test_kept_tables_find_what_a_model_with_other_settings_finds(recordings, tmp_path):
+def test_kept_tables_find_what_a_model_with_other_settings_finds(recordings, tmp_path, monkeypatch):
+    monkeypatch.setattr("facesynth.methods.learn.expectation.STEPS", 3)
     database, tuning_part, _ = split_for_tuning(Corpus.open(recordings[0].corpus), 2, 2, seed=0)
-    model = Efase(maps=False, temperature=1.0, candidates=6, audio_weight=1.0).fit(database)
+    model = Efase(maps=False, temperature=1.0, candidates=6, audio_weight=1.0, pose_weight=1.0, expected_share=0.5).fit(database)
     changing, examples = ChangingSettings(model), examples_of(model, tuning_part)
     for temperature in (0.0, 0.4):
-        other = {**PUBLISHED, "temperature": temperature, "audio_weight": 0.3}
+        other = {**PUBLISHED, "temperature": temperature, "audio_weight": 0.3, "pose_weight": 2.0, "expected_share": 0.2}
         plain = sentence_errors(model.with_weights(**other).speaker, examples)
         assert sentence_errors(changing.speaker(other), examples) == pytest.approx(plain, rel=1e-6)
 
