@@ -9,11 +9,13 @@ recorded motion also as they were drawn before: a face whose place is said (`--b
 as before the lips were known. How far lips are apart is read from what is seen between them, in drawn and recorded video alike,
 by a ruler that learned from the recorded clips of the other folds (`benchmarks/lip_ruler.py`: how well); millimetres take the
 outer corners of the eyes to be 90 mm apart. What methods make is kept in `report/motions`, what was measured of a clip in
-`report/rows`: a second run learns and draws only what is not there, so remove what another version made.
+`report/rows`: a second run learns and draws only the rows that are not there (its `*.png` show these alone), so remove what
+another version made.
 """
 
 import argparse
 import json
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -87,10 +89,10 @@ def main() -> None:
     rows: dict[str, list[Row]] = {row: [] for row in ("recorded", *before, *(one.label for one in methods), RECORDED)}
     for train, test in track(list(corpus.folds(options.folds))[: options.first], "folds"):
         kept = [read_rows(options.output, name) for name in test.ids]
-        if not all(set(rows) <= set(known) for known in kept):
+        if wanted := lacking(rows, kept):
             motions = options.output / "motions"
-            made = drawn(plain, train.ids, test.ids, methods[:1], motions, BEFORE_TOO, **BEFORE) if plain else {}
-            made |= drawn(corpus, train.ids, test.ids, methods, motions)
+            made = drawn(plain, train.ids, test.ids, methods[:1], motions, wanted, BEFORE_TOO, **BEFORE) if plain else {}
+            made |= drawn(corpus, train.ids, test.ids, methods, motions, wanted)
             ruler = LipRuler.learn([clips[name].samples for name in train.ids])
             kept = [judged(name, clips[name], ruler, made, options.output) for name in test.ids]
         for row, some in rows.items():
@@ -133,15 +135,21 @@ def drawn(
     test: tuple[str, ...],
     methods: list[Contestant],
     kept: Path,
+    wanted: set[str],
     when: str = "",
     **settings: Any,
 ) -> dict[str, dict[str, tuple[Pictures, Report]]]:
-    """By row: the pictures of each utterance of `test` on the face of `train`, by models of it and by the recorded points."""
+    """By row that is `wanted`: the pictures of each utterance of `test` on the face of `train`, by models of it and by the
+    recorded points."""
+    methods = [one for one in methods if one.label + when in wanted]
+    if not methods and RECORDED + when not in wanted:
+        return {}
     others = corpus.subset(train)
     speaker = speaker_of(others)
     face = TexturedFace(speaker, **settings)
     motions = {one.label + when: said(one, others, corpus.subset(test), speaker, kept / (one.label + when)) for one in methods}
-    motions[RECORDED + when] = {utterance.id: utterance.motion for utterance in corpus.subset(test)}
+    if RECORDED + when in wanted:
+        motions[RECORDED + when] = {utterance.id: utterance.motion for utterance in corpus.subset(test)}
     return {row: {name: pictures(face, motion) for name, motion in some.items()} for row, some in motions.items()}
 
 
@@ -169,6 +177,11 @@ def read_rows(output: Path, name: str) -> dict[str, Row]:
     return {row: Row(**values) for row, values in json.loads(path.read_text()).items()} if path.is_file() else {}
 
 
+def lacking(rows: Collection[str], kept: list[dict[str, Row]]) -> set[str]:
+    """Those of `rows` that were not measured of every clip."""
+    return {row for row in rows if not all(row in known for known in kept)}
+
+
 def judged(
     name: str, clip: Recorded, ruler: LipRuler, made: dict[str, dict[str, tuple[Pictures, Report]]], output: Path
 ) -> dict[str, Row]:
@@ -193,10 +206,8 @@ def judged(
             found.blinking,
             report.real_time_factor,
         )
-    write_text(
-        output / "rows" / f"{name}.json",
-        json.dumps({row: asdict(values) for row, values in (read_rows(output, name) | rows).items()}),
-    )
+    rows = read_rows(output, name) | rows
+    write_text(output / "rows" / f"{name}.json", json.dumps({row: asdict(values) for row, values in rows.items()}))
     save_sheet(clips, seen, {row: list(range(12, len(clip.points) - 12, 4)) for row in clips}, output / f"{name}.png")
     save_sheet(clips, seen, {row: frames for row, (_, frames) in closed.items()}, output / f"{name}_closed.png")
     return rows
