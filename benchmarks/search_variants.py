@@ -126,6 +126,13 @@ def more_candidates(trial: Trial) -> Rows:
     yield from shown("150 candidates in place of 60", trial.model.with_weights(candidates=150).speaker, trial.held_out)
 
 
+def other_weights(trial: Trial) -> Rows:
+    """The expected pose counts more or less in the cost, and dear paths in the mean."""
+    for pose, temperature in ((0.5, 1.0), (1.0, 0.5), (1.0, 2.0), (2.0, 1.0), (2.0, 2.0), (4.0, 1.0)):
+        model = trial.model.with_weights(pose_weight=pose, temperature=temperature)
+        yield from shown(f"pose_weight {pose:g}, temperature {temperature:g}", model.speaker, trial.held_out)
+
+
 def longer_pieces(trial: Trial) -> Rows:
     penalty = 2 * trial.model.config["penalty"]
     yield from shown("leaving a recording costs twice as much", trial.model.with_weights(penalty=penalty).speaker, trial.held_out)
@@ -232,6 +239,7 @@ TRIED: dict[str, Callable[[Trial], Rows]] = {
     "certainty": weighed,
     "candidates": more_candidates,
     "longer": longer_pieces,
+    "weights": other_weights,
     "ear": by_ear,
     "expectations": by_expectation,
     "differences": differences,
