@@ -36,8 +36,8 @@ STORED = 2
 SAMPLES, SAMPLED = 10, 20
 """A method that draws makes so many motions of each of so many of a fold's utterances."""
 WARM_UTTERANCES = 6
-BRIEF: Mapping[str, Any] = {"steps": 1, "learn": False}
-"""Settings with which a method that has them learns briefly."""
+BRIEF: Mapping[str, Any] = {"steps": 1, "learn": False, "pose_weight": 0.0, "expected_share": 0.0}
+"""Settings with which a method that has them learns briefly: not even the network of a search that expects poses."""
 _warm: set[str] = set()
 """Methods that this process has trained and heard before."""
 

@@ -7,6 +7,7 @@ import pytest
 from corpora import tiny_corpus
 from filelock import FileLock
 
+from facesynth.config import load_config
 from facesynth.corpus.workers import Workers
 from facesynth.evaluation import jobs
 from facesynth.evaluation.compare import evaluate, folds_beside, judge_predictions, predicted_labels
@@ -18,6 +19,8 @@ from facesynth.inference.errors import FacesynthError
 from facesynth.inference.motion import Motion
 from facesynth.methods.baselines.mean_face import MeanFace
 from facesynth.methods.baselines.phone_mean import PhoneMean
+from facesynth.methods.learn.expectation import PosePredictor
+from facesynth.methods.registry import create
 
 QUICK = tuple(Contestant(name, name.replace(" ", "_")) for name in ("mean face", "phone mean", "ridge"))
 COSTS = ("train_s", "train_cpu_s", "train_minutes", "rtf", "rtf_cpu", "peak_mb", "model_mb")
@@ -152,6 +155,19 @@ def test_who_comes_first_pays_for_nothing(corpus, folds, tmp_path, monkeypatch):
     monkeypatch.setattr(PhoneMean, "fit", lambda self, some, *, seed=0: learned.append(len(some)) or fit(self, some, seed=seed))
     evaluate([Contestant(name, "phone_mean") for name in ("one", "two")], corpus, folds[:1], tmp_path)
     assert learned == [jobs.WARM_UTTERANCES, len(folds[0].train), len(folds[0].train)]
+
+
+@pytest.mark.parametrize("name", ["efase", "anime_graph"])
+def test_a_search_that_expects_poses_is_warm_without_its_network(name, corpus, folds, repository, tmp_path, monkeypatch):
+    made = []
+    monkeypatch.setattr(jobs, "_warm", set())
+    monkeypatch.setattr(jobs, "create", lambda method, **settings: made.append(create(method, **settings)) or made[-1])
+    monkeypatch.setattr(PosePredictor, "learn", lambda *_: pytest.fail("hundreds of steps, to be warm"))
+    settings = load_config(repository / "configs" / f"{name}_soft.yaml")
+    job = jobs.Job(corpus.path, tmp_path, Contestant("soft", name, settings=settings), folds[0], 1, 0)
+    jobs._warm_up(job, corpus.subset(corpus.ids[: jobs.WARM_UTTERANCES]))
+    assert [type(model).__name__.lower() for model in made] == [name.replace("_", "")]
+    assert made[0].layout == corpus.layout
 
 
 def test_a_method_that_draws_is_judged_by_several_motions(result, corpus, folds, tmp_path):
