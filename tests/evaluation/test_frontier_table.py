@@ -55,3 +55,12 @@ def test_the_frontiers_table_leaves_out_what_is_not_told(table):
     resting = face(np.full(48, 1.5))
     assert np.isnan(table.figures(resting, NEVER[0], shut_opening(NEVER, []))[3:]).all(), "neither closures nor false ones"
     assert table.cells(np.array([[1.5, 1.0, np.nan, 0.5], [1.7, 0.8, np.nan, np.nan]])) == "1.600 | 0.90 |  | 0.50"
+
+
+def test_rows_are_told_from_those_that_were_made_alike(table, capsys):
+    """A row that is 0.1 mm nearer in each of ten clips; one whose other is not there says nothing."""
+    errors = np.linspace(1.0, 2.0, 10)[:, None]
+    table.made_alike({"network, sharpened": errors, "anime graph soft, sharpened": errors - 0.1, "anime graph soft": errors})
+    assert capsys.readouterr().out.splitlines() == [
+        "- anime graph soft, sharpened: 0.1000 mm nearer than network, sharpened, in 10 of 10 clips, p = 0.002"
+    ]
