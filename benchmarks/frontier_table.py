@@ -119,7 +119,8 @@ def made_alike(rows: dict[str, np.ndarray]) -> None:
     gains = [rows[other][:, 0] - rows[row][:, 0] for row, other in pairs]
     chances = holm([float(wilcoxon(each).pvalue) for each in gains])
     for (row, other), each, chance in zip(pairs, gains, chances, strict=True):
-        print(f"- {row}: {each.mean():.4f} mm nearer than {other}, in {(each > 0).sum()} of {len(each)} clips, p = {chance:.2g}")
+        clips = f"{(each > 0).sum()} of {len(each)} clips"
+        print(f"- {row}, nearer than {other} by {each.mean():.4f} mm, in {clips}, p = {chance:.2g}")
 
 
 def differences(each: np.ndarray) -> np.ndarray:

@@ -62,5 +62,5 @@ def test_rows_are_told_from_those_that_were_made_alike(table, capsys):
     errors = np.linspace(1.0, 2.0, 10)[:, None]
     table.made_alike({"network, sharpened": errors, "anime graph soft, sharpened": errors - 0.1, "anime graph soft": errors})
     assert capsys.readouterr().out.splitlines() == [
-        "- anime graph soft, sharpened: 0.1000 mm nearer than network, sharpened, in 10 of 10 clips, p = 0.002"
+        "- anime graph soft, sharpened, nearer than network, sharpened by 0.1000 mm, in 10 of 10 clips, p = 0.002"
     ]
