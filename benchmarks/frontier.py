@@ -176,7 +176,7 @@ def soft_efase(network: Network, learned: Corpus) -> Efase:
 
 def showing(model: Efase, shares: Shares) -> Efase:
     """The same, of each component such shares of what the search finds and of what is expected."""
-    model.show(shares)
+    model.set_shares(shares)
     return model
 
 

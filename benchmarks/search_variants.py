@@ -229,7 +229,7 @@ def by_component(trial: Trial) -> Rows:
     some, made = list(trial.held_out), {}
     for learned, others in ((some[::2], some[1::2]), (some[1::2], some[::2])):
         model = trial.model.with_weights(expected_share=SHARES[1])
-        model.show(learned_shares(model, learned))
+        model.set_shares(learned_shares(model, learned))
         made |= {u.id: model.synthesize(u.speech) for u in others}
     yield "shares by component, chosen on the other half of the clips", made
 

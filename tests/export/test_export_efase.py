@@ -249,7 +249,7 @@ def soft_model(small_corpus):
             components=6, temperature=1.0, candidates=30, audio_weight=0.4, pose_weight=0.7, expected_share=0.3, sharpening=0.8
         ).fit(small_corpus)
     model.count_by(np.linspace(0.5, 1.5, len(model.audio.sound.size)), np.linspace(0.5, 2, 6))
-    model.show(np.stack([np.linspace(0.9, 0.2, 6), np.linspace(0.1, 0.9, 6)]).tolist())
+    model.set_shares(np.stack([np.linspace(0.9, 0.2, 6), np.linspace(0.1, 0.9, 6)]).tolist())
     return model
 
 

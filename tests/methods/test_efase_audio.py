@@ -153,10 +153,10 @@ def test_each_component_has_its_own_shares_of_what_is_found_and_expected(hearing
     model = hearing.with_weights(expected_share=0.25)
     one, found, expected = posed(model, speech)
     count = found.shape[1]
-    model.show([[0.75] * count, [0.25] * count])
+    model.set_shares([[0.75] * count, [0.25] * count])
     np.testing.assert_allclose(posed(model, speech)[0], one, atol=1e-9)
     own, others = np.linspace(0, 1.5, count), np.linspace(1, -0.5, count)
-    model.show([own.tolist(), others.tolist()])
+    model.set_shares([own.tolist(), others.tolist()])
     shown = posed(model, speech)[0]
     np.testing.assert_allclose(shown, own * found + others * expected, atol=1e-4)
     np.testing.assert_allclose(shown[:, 0], expected[:, 0], atol=1e-9)

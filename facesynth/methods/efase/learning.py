@@ -118,7 +118,7 @@ def learn(corpus: Corpus, settings: Mapping[str, Any], *, seed: int = 0, rounds:
     if settings.get("expected_share", 0) > 0:
         count = sum(len(part) for part in held_out)
         learned = replace(learned, shares=learned_shares(model, track(chain(*held_out), "shares of components", count)))
-        model.show(learned.shares)
+        model.set_shares(learned.shares)
     if settings.get("sharpening", 0) > 0:
         learned.settings["sharpening"] = _sharpening(model, held_out[1], settings.get("residual", 0.0))
     return learned

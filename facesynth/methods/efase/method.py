@@ -143,21 +143,21 @@ class Efase(Method):
         super().remember({key: value for key, value in account.items() if key not in (*METRICS, "shares")})
         if account:
             self.count_by(*(account[metric] for metric in METRICS))
-            self.show(account["shares"])
+            self.set_shares(account["shares"])
 
     def count_by(self, sound: Sequence[float], pose: Sequence[float]) -> None:
         """Let the squared differences of each component of the sound and of the pose count by these factors."""
         self.audio.count_by(sound, pose)
         self._speaker = self._edited = None
 
-    def show(self, shares: Sequence[Sequence[float]]) -> None:
+    def set_shares(self, shares: Sequence[Sequence[float]]) -> None:
         """Of each component [2, D] so much of what the search finds and of what is expected; none: `expected_share` says it."""
         self.register_buffer("component_shares", torch.tensor(shares, dtype=torch.float32))
         self._speaker = self._edited = None
 
     @property
     def shares(self) -> Floats | None:
-        """[2, D] what `show` was told; None where `expected_share` says it."""
+        """[2, D] what `set_shares` was told; None where `expected_share` says it."""
         shares: Tensor | None = getattr(self, "component_shares", None)
         return shares.cpu().double().numpy() if shares is not None and shares.numel() else None
 
